@@ -1,0 +1,52 @@
+# Functions that every component uses, so that targets look alike.
+
+# Warnings for our own code; third-party headers come in as SYSTEM.
+# -Wno-restrict: g++ 12 reports string concatenation falsely (GCC bug 105651).
+function(trigpoint_warnings target)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow -Wnon-virtual-dtor
+                                           -Woverloaded-virtual -Wno-restrict $<$<BOOL:${TRIGPOINT_WERROR}>:-Werror>)
+endfunction()
+
+# trigpoint_library(<name> SOURCES ... [PUBLIC libs...] [PRIVATE libs...])
+# Library trigpoint_<name>, alias trigpoint::<name>, public headers in include/trigpoint/<name>.
+function(trigpoint_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  set(target trigpoint_${name})
+  add_library(${target} STATIC ${ARG_SOURCES})
+  add_library(trigpoint::${name} ALIAS ${target})
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
+  file(GLOB_RECURSE headers CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/include/*.hpp)
+  target_sources(${target} PUBLIC FILE_SET HEADERS BASE_DIRS ${CMAKE_CURRENT_SOURCE_DIR}/include FILES ${headers})
+  target_include_directories(${target} PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/src)
+  target_link_libraries(${target} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
+  trigpoint_warnings(${target})
+  install(TARGETS ${target} EXPORT trigpoint-targets FILE_SET HEADERS)
+endfunction()
+
+# trigpoint_program(<name> SOURCES ... LIBS ...): an installed executable.
+function(trigpoint_program name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LIBS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE ${ARG_LIBS})
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
+  trigpoint_warnings(${name})
+  install(TARGETS ${name})
+endfunction()
+
+# trigpoint_test(<name> SOURCES ... LIBS ... [LABELS ...] [TIMEOUT s]): one GoogleTest binary in
+# bin/, each TEST a ctest of its own. The label "long" keeps a test out of the default run.
+function(trigpoint_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LIBS;LABELS" ${ARGN})
+  if(NOT TRIGPOINT_BUILD_TESTS)
+    return()
+  endif()
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 120)
+  endif()
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE ${ARG_LIBS} GTest::gmock GTest::gtest_main)
+  target_compile_definitions(${name} PRIVATE TRIGPOINT_SHARED_DATA="${TRIGPOINT_SHARED_DATA}" TRIGPOINT_SOURCE_DIR="${PROJECT_SOURCE_DIR}" TRIGPOINT_BIN_DIR="${CMAKE_BINARY_DIR}/bin")
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
+  trigpoint_warnings(${name})
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}")
+endfunction()

@@ -1,0 +1,281 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <numeric>
+#include <set>
+#include <sstream>
+
+#include <yaml-cpp/yaml.h>
+
+#include "trigpoint/base/config.hpp"
+
+namespace trigpoint {
+
+namespace {
+
+/// Number of single-letter edits between two words; used only to suggest a key.
+std::size_t edit_distance(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t substitute = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({row[j] + 1, row[j - 1] + 1, substitute});
+    }
+  }
+  return row[b.size()];
+}
+
+/// Shortest decimal text that reads back as the same double, with a point so that it stays a number.
+std::string number_text(double value) {
+  for (int digits = 1; digits <= 17; ++digits) {
+    std::array<char, 40> text{};
+    std::snprintf(text.data(), text.size(), "%.*g", digits, value);
+    if (std::stod(text.data()) == value) {
+      std::string result = text.data();
+      return result.find_first_of(".en") == std::string::npos ? result + ".0" : result;
+    }
+  }
+  return std::to_string(value);
+}
+
+std::string bounds_text(const Bounds& bounds) {
+  if (std::isinf(bounds.highest)) {
+    return bounds.lowest == 0.0 ? "0 or more" : bounds.lowest == kPositive.lowest ? "more than 0" : "at least " + number_text(bounds.lowest);
+  }
+  return "between " + number_text(bounds.lowest) + " and " + number_text(bounds.highest);
+}
+
+/// Reads one mapping of one YAML file into the fields that are described to it.
+class Loader final : public ConfigFields {
+ public:
+  Loader(const YAML::Node& node, std::string file, std::string path)
+      : node_(node), file_(std::move(file)), path_(std::move(path)) {
+    if (node_ && !node_.IsNull() && !node_.IsMap()) {
+      throw ConfigError(file_ + ":" + std::to_string(node_.Mark().line + 1) + ": " + (path_.empty() ? "the document" : path_) + " must be a mapping of keys to values");
+    }
+  }
+
+  void number(const std::string& key, double& value, const std::string&, Bounds bounds) override {
+    read(key, value, bounds, "a number");
+  }
+
+  void integer(const std::string& key, std::int64_t& value, const std::string&, Bounds bounds) override {
+    read(key, value, bounds, "a whole number");
+  }
+
+  void flag(const std::string& key, bool& value, const std::string&) override {
+    if (const YAML::Node entry = find(key)) {
+      value = as<bool>(entry, key, "true or false");
+    }
+  }
+
+  void text(const std::string& key, std::string& value, const std::string&) override {
+    if (const YAML::Node entry = find(key)) {
+      value = as<std::string>(entry, key, "a text");
+    }
+  }
+
+  void choice(const std::string& key, std::string& value, const std::string&, const std::vector<std::string>& choices) override {
+    const YAML::Node entry = find(key);
+    if (!entry) {
+      return;
+    }
+    value = as<std::string>(entry, key, "a text");
+    if (std::find(choices.begin(), choices.end(), value) == choices.end()) {
+      std::string list;
+      for (const std::string& each : choices) {
+        list += (list.empty() ? "" : ", ") + each;
+      }
+      fail(entry, key, "must be one of " + list + "; is '" + value + "'");
+    }
+  }
+
+  void vector3(const std::string& key, Eigen::Vector3d& value, const std::string&, Bounds bounds) override {
+    const YAML::Node entry = find(key);
+    if (!entry) {
+      return;
+    }
+    if (!entry.IsSequence() || entry.size() != 3) {
+      fail(entry, key, "must be three numbers, like [0.0, 0.0, 0.0]; is " + YAML::Dump(entry));
+    }
+    for (int i = 0; i < 3; ++i) {
+      value[i] = as<double>(entry[i], key, "three numbers");
+      check(entry, key, value[i], bounds);
+    }
+  }
+
+  void texts(const std::string& key, std::vector<std::string>& values, const std::string&) override {
+    const YAML::Node entry = find(key);
+    if (!entry) {
+      return;
+    }
+    if (!entry.IsSequence()) {
+      fail(entry, key, "must be a list of texts; is " + YAML::Dump(entry));
+    }
+    values.clear();
+    for (const YAML::Node& each : entry) {
+      values.push_back(as<std::string>(each, key, "a list of texts"));
+    }
+  }
+
+  void section(const std::string& key, const std::string&, const std::function<void(ConfigFields&)>& describe_section) override {
+    const YAML::Node entry = find(key);
+    Loader below(entry ? entry : YAML::Node(), file_, path_.empty() ? key : path_ + "." + key);
+    describe_section(below);
+    below.reject_unknown_keys();
+  }
+
+  void reject_unknown_keys() const {
+    if (!node_ || !node_.IsMap()) {
+      return;
+    }
+    for (const auto& pair : node_) {
+      const auto key = pair.first.as<std::string>();
+      if (!known_.contains(key)) {
+        fail(pair.first, key, "is not a known key" + suggestion(key));
+      }
+    }
+  }
+
+ private:
+  YAML::Node find(const std::string& key) {
+    known_.insert(key);
+    return node_ && node_.IsMap() ? node_[key] : YAML::Node(YAML::NodeType::Undefined);
+  }
+
+  template <typename T>
+  T as(const YAML::Node& entry, const std::string& key, const std::string& what) const {
+    try {
+      return entry.as<T>();
+    } catch (const YAML::Exception&) {
+      fail(entry, key, "must be " + what + "; is '" + YAML::Dump(entry) + "'");
+    }
+  }
+
+  template <typename T>
+  void read(const std::string& key, T& value, Bounds bounds, const std::string& what) {
+    if (const YAML::Node entry = find(key)) {
+      value = as<T>(entry, key, what);
+      check(entry, key, static_cast<double>(value), bounds);
+    }
+  }
+
+  void check(const YAML::Node& entry, const std::string& key, double value, const Bounds& bounds) const {
+    if (!std::isfinite(value)) {
+      fail(entry, key, "must be finite; is " + YAML::Dump(entry));
+    }
+    if (value < bounds.lowest || value > bounds.highest) {
+      fail(entry, key, "must be " + bounds_text(bounds) + "; is " + YAML::Dump(entry));
+    }
+  }
+
+  [[noreturn]] void fail(const YAML::Node& at, const std::string& key, const std::string& what) const {
+    throw ConfigError(file_ + ":" + std::to_string(at.Mark().line + 1) + ": " + (path_.empty() ? "" : path_ + ".") + key + " " + what);
+  }
+
+  std::string suggestion(const std::string& key) const {
+    const auto nearest = std::min_element(known_.begin(), known_.end(), [&key](const std::string& a, const std::string& b) {
+      return edit_distance(key, a) < edit_distance(key, b);
+    });
+    const bool close = nearest != known_.end() && edit_distance(key, *nearest) <= std::max<std::size_t>(3, key.size() / 3);
+    return close ? "; did you mean '" + *nearest + "'?" : "";
+  }
+
+  YAML::Node node_;
+  std::string file_;
+  std::string path_;
+  std::set<std::string> known_;
+};
+
+/// Writes what is described to it as YAML.
+class Printer final : public ConfigFields {
+ public:
+  explicit Printer(std::ostream& out, int depth = 0) : out_(out), indent_(static_cast<std::size_t>(depth) * 2, ' '), depth_(depth) {}
+
+  void number(const std::string& key, double& value, const std::string& doc, Bounds) override { line(key, number_text(value), doc); }
+
+  void integer(const std::string& key, std::int64_t& value, const std::string& doc, Bounds) override { line(key, std::to_string(value), doc); }
+
+  void flag(const std::string& key, bool& value, const std::string& doc) override { line(key, value ? "true" : "false", doc); }
+
+  void text(const std::string& key, std::string& value, const std::string& doc) override { line(key, quoted(value), doc); }
+
+  void choice(const std::string& key, std::string& value, const std::string& doc, const std::vector<std::string>& choices) override {
+    std::string list;
+    for (const std::string& each : choices) {
+      list += (list.empty() ? "" : " | ") + each;
+    }
+    line(key, value, doc + " (" + list + ")");
+  }
+
+  void vector3(const std::string& key, Eigen::Vector3d& value, const std::string& doc, Bounds) override {
+    line(key, "[" + number_text(value.x()) + ", " + number_text(value.y()) + ", " + number_text(value.z()) + "]", doc);
+  }
+
+  void texts(const std::string& key, std::vector<std::string>& values, const std::string& doc) override {
+    std::string list;
+    for (const std::string& each : values) {
+      list += (list.empty() ? "" : ", ") + quoted(each);
+    }
+    line(key, "[" + list + "]", doc);
+  }
+
+  void section(const std::string& key, const std::string& doc, const std::function<void(ConfigFields&)>& describe_section) override {
+    out_ << (depth_ == 0 ? "\n" : "") << indent_ << key << ":  # " << doc << "\n";
+    Printer below(out_, depth_ + 1);
+    describe_section(below);
+  }
+
+ private:
+  static std::string quoted(const std::string& text) { return "\"" + text + "\""; }
+
+  void line(const std::string& key, const std::string& value, const std::string& doc) { out_ << indent_ << key << ": " << value << "  # " << doc << "\n"; }
+
+  std::ostream& out_;
+  std::string indent_;
+  int depth_;
+};
+
+YAML::Node parse(const std::function<YAML::Node()>& load, const std::string& name) {
+  try {
+    return load();
+  } catch (const YAML::BadFile&) {
+    throw ConfigError(name + ": cannot be read: no such file, or no permission");
+  } catch (const YAML::ParserException& error) {
+    throw ConfigError(name + ":" + std::to_string(error.mark.line + 1) + ": is not YAML: " + error.msg);
+  }
+}
+
+void visit(const YAML::Node& root, const std::string& name, const std::function<void(ConfigFields&)>& document) {
+  Loader loader(root, name, "");
+  document(loader);
+  loader.reject_unknown_keys();
+}
+
+}  // namespace
+
+void load_config(const std::vector<std::string>& files, const std::function<void(ConfigFields&)>& document) {
+  for (const std::string& file : files) {
+    visit(parse([&file] { return YAML::LoadFile(file); }, file), file, document);
+  }
+}
+
+void load_config_text(const std::string& yaml, const std::string& name, const std::function<void(ConfigFields&)>& document) {
+  visit(parse([&yaml] { return YAML::Load(yaml); }, name), name, document);
+}
+
+std::string print_config(const std::function<void(ConfigFields&)>& document) {
+  std::ostringstream out;
+  Printer printer(out);
+  document(printer);
+  return out.str();
+}
+
+}  // namespace trigpoint

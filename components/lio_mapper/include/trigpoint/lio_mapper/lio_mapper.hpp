@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "trigpoint/base/event.hpp"
+#include "trigpoint/base/measurements.hpp"
+#include "trigpoint/base/messages.hpp"
+#include "trigpoint/base/robot.hpp"
+#include "trigpoint/lio_mapper/config.hpp"
+
+namespace trigpoint::lio_mapper {
+
+/// A scan worth keeping for the saved map: its undistorted, down-sampled points and where it was.
+struct Keyframe {
+  std::uint64_t id{0};
+  Nanoseconds stamp_ns{0};
+  std::uint32_t odom_epoch{0};
+  Pose T_odom_base;
+  Matrix6d pose_covariance{Matrix6d::Zero()};
+  bool aligned{false};
+  YawPose T_map_odom;  ///< at that time
+  PointCloud points_base;
+};
+
+/// One sweep that went through the filter.
+struct ScanResult {
+  Odometry odometry;        ///< base_link in odom at the sweep's last point
+  LioStatus status;
+  PointCloud points_odom;   ///< registered points (undistorted, down-sampled as configured)
+  std::optional<Keyframe> keyframe;
+};
+
+struct Output {
+  std::vector<ScanResult> scans;              ///< usually none or one
+  std::optional<Odometry> odometry_imu_rate;  ///< propagated to the newest IMU sample
+  Events events;
+};
+
+/// FAST-LIO2-style estimator [W. Xu et al., FAST-LIO2, T-RO 2022] with T_map_odom in its state.
+/// Deterministic and single-threaded to its user; no clock: the same inputs in the same order give
+/// the same bits. Never throws on data: refused inputs are counted in LioStatus and told as events.
+class LioMapper {
+ public:
+  /// Throws ConfigError when the configuration contradicts itself.
+  LioMapper(const Config& config, const RobotConfig& robot);
+  ~LioMapper();
+
+  Output on_imu(const ImuSample& sample);
+  /// A sweep is processed as soon as the IMU covers its last point.
+  Output on_cloud(const PointCloudMessage& cloud);
+  /// Rows from the gate, at most one set per fix, applied at the fix's stamp.
+  Output on_state_update(const StateUpdate& update);
+  /// Processes what waits for IMU samples that will not come (end of a log).
+  Output finish();
+
+  /// The points of the local map, in odom.
+  PointCloud local_map() const;
+
+  /// The newest status, also between scans.
+  LioStatus status() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace trigpoint::lio_mapper

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// One interface for every recorded (or simulated) drive.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "trigpoint/base/event.hpp"
+#include "trigpoint/base/measurements.hpp"
+#include "trigpoint/base/robot.hpp"
+
+namespace trigpoint::recording {
+
+/// A log that cannot be read; names the file, what was found and what was expected.
+class LogError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+using Measurement = std::variant<ImuSample, GnssFix, PointCloudMessage>;
+
+/// One input in the order in which it became available.
+struct LogEntry {
+  Nanoseconds receive_ns{0};  ///< recorded arrival; a sweep arrives with its last point
+  Measurement measurement;
+  bool withheld{false};       ///< a fix for scoring only, not to be fed to any filter
+};
+
+struct TopicSummary {
+  std::string topic;
+  std::string type;  ///< e.g. "sensor_msgs/msg/Imu"
+  std::uint64_t messages{0};
+};
+
+struct LogSummary {
+  std::string path;
+  std::string format;  ///< "rosbag1", "rosbag2", "kitti", "scenario"
+  Nanoseconds first_ns{0};
+  Nanoseconds last_ns{0};
+  std::vector<TopicSummary> topics;
+};
+
+class LogReader {
+ public:
+  virtual ~LogReader() = default;
+
+  virtual const LogSummary& summary() const = 0;
+  /// The next entry of the three mapped topics in order of receive_ns; nullopt at the end. Throws
+  /// LogError when the log breaks off; what came before stays valid.
+  virtual std::optional<LogEntry> next() = 0;
+  /// 0 to 1, for progress bars.
+  virtual double progress() const = 0;
+  /// A trajectory file (TUM) with the truth beside the log, if there is one.
+  virtual std::optional<std::string> truth_file() const { return std::nullopt; }
+  /// What the log itself knows of the robot (KITTI's calibration, a scenario's sensors); what the
+  /// user's configuration leaves at its default is taken from here.
+  virtual std::optional<RobotConfig> robot() const { return std::nullopt; }
+};
+
+/// Opens a ROS 1 bag (.bag), a rosbag2 folder or .db3 file, or a KITTI raw drive folder. Throws
+/// LogError when the path does not exist, is empty, is of no known kind, or lacks a mapped topic
+/// (naming it, what is there instead, and the nearest name).
+std::unique_ptr<LogReader> open_log(const std::string& path, const RobotConfig& robot);
+
+}  // namespace trigpoint::recording
