@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
+#include "trigpoint/base/config.hpp"
+
+#include <yaml-cpp/yaml.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -7,10 +11,6 @@
 #include <numeric>
 #include <set>
 #include <sstream>
-
-#include <yaml-cpp/yaml.h>
-
-#include "trigpoint/base/config.hpp"
 
 namespace trigpoint {
 
@@ -32,7 +32,8 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
   return row[b.size()];
 }
 
-/// Shortest decimal text that reads back as the same double, with a point so that it stays a number.
+/// Shortest decimal text that reads back as the same double, with a point so that it stays a
+/// number.
 std::string number_text(double value) {
   for (int digits = 1; digits <= 17; ++digits) {
     std::array<char, 40> text{};
@@ -47,7 +48,9 @@ std::string number_text(double value) {
 
 std::string bounds_text(const Bounds& bounds) {
   if (std::isinf(bounds.highest)) {
-    return bounds.lowest == 0.0 ? "0 or more" : bounds.lowest == kPositive.lowest ? "more than 0" : "at least " + number_text(bounds.lowest);
+    return bounds.lowest == 0.0                ? "0 or more"
+           : bounds.lowest == kPositive.lowest ? "more than 0"
+                                               : "at least " + number_text(bounds.lowest);
   }
   return "between " + number_text(bounds.lowest) + " and " + number_text(bounds.highest);
 }
@@ -58,7 +61,9 @@ class Loader final : public ConfigFields {
   Loader(const YAML::Node& node, std::string file, std::string path)
       : node_(node), file_(std::move(file)), path_(std::move(path)) {
     if (node_ && !node_.IsNull() && !node_.IsMap()) {
-      throw ConfigError(file_ + ":" + std::to_string(node_.Mark().line + 1) + ": " + (path_.empty() ? "the document" : path_) + " must be a mapping of keys to values");
+      throw ConfigError(file_ + ":" + std::to_string(node_.Mark().line + 1) + ": " +
+                        (path_.empty() ? "the document" : path_) +
+                        " must be a mapping of keys to values");
     }
   }
 
@@ -66,7 +71,10 @@ class Loader final : public ConfigFields {
     read(key, value, bounds, "a number");
   }
 
-  void integer(const std::string& key, std::int64_t& value, const std::string&, Bounds bounds) override {
+  void integer(const std::string& key,
+               std::int64_t& value,
+               const std::string&,
+               Bounds bounds) override {
     read(key, value, bounds, "a whole number");
   }
 
@@ -82,7 +90,10 @@ class Loader final : public ConfigFields {
     }
   }
 
-  void choice(const std::string& key, std::string& value, const std::string&, const std::vector<std::string>& choices) override {
+  void choice(const std::string& key,
+              std::string& value,
+              const std::string&,
+              const std::vector<std::string>& choices) override {
     const YAML::Node entry = find(key);
     if (!entry) {
       return;
@@ -97,7 +108,10 @@ class Loader final : public ConfigFields {
     }
   }
 
-  void vector3(const std::string& key, Eigen::Vector3d& value, const std::string&, Bounds bounds) override {
+  void vector3(const std::string& key,
+               Eigen::Vector3d& value,
+               const std::string&,
+               Bounds bounds) override {
     const YAML::Node entry = find(key);
     if (!entry) {
       return;
@@ -111,7 +125,9 @@ class Loader final : public ConfigFields {
     }
   }
 
-  void texts(const std::string& key, std::vector<std::string>& values, const std::string&) override {
+  void texts(const std::string& key,
+             std::vector<std::string>& values,
+             const std::string&) override {
     const YAML::Node entry = find(key);
     if (!entry) {
       return;
@@ -125,12 +141,16 @@ class Loader final : public ConfigFields {
     }
   }
 
-  void section(const std::string& key, const std::string&, const std::function<void(ConfigFields&)>& describe_section) override {
+  void section(const std::string& key,
+               const std::string&,
+               const std::function<void(ConfigFields&)>& describe_section) override {
     const YAML::Node entry = find(key);
     Loader below(entry ? entry : YAML::Node(), file_, path_.empty() ? key : path_ + "." + key);
     describe_section(below);
     below.reject_unknown_keys();
   }
+
+  void other_section(const std::string& key) override { find(key); }
 
   void reject_unknown_keys() const {
     if (!node_ || !node_.IsMap()) {
@@ -167,7 +187,10 @@ class Loader final : public ConfigFields {
     }
   }
 
-  void check(const YAML::Node& entry, const std::string& key, double value, const Bounds& bounds) const {
+  void check(const YAML::Node& entry,
+             const std::string& key,
+             double value,
+             const Bounds& bounds) const {
     if (!std::isfinite(value)) {
       fail(entry, key, "must be finite; is " + YAML::Dump(entry));
     }
@@ -176,15 +199,20 @@ class Loader final : public ConfigFields {
     }
   }
 
-  [[noreturn]] void fail(const YAML::Node& at, const std::string& key, const std::string& what) const {
-    throw ConfigError(file_ + ":" + std::to_string(at.Mark().line + 1) + ": " + (path_.empty() ? "" : path_ + ".") + key + " " + what);
+  [[noreturn]] void fail(const YAML::Node& at,
+                         const std::string& key,
+                         const std::string& what) const {
+    throw ConfigError(file_ + ":" + std::to_string(at.Mark().line + 1) + ": " +
+                      (path_.empty() ? "" : path_ + ".") + key + " " + what);
   }
 
   std::string suggestion(const std::string& key) const {
-    const auto nearest = std::min_element(known_.begin(), known_.end(), [&key](const std::string& a, const std::string& b) {
-      return edit_distance(key, a) < edit_distance(key, b);
-    });
-    const bool close = nearest != known_.end() && edit_distance(key, *nearest) <= std::max<std::size_t>(3, key.size() / 3);
+    const auto nearest = std::min_element(
+        known_.begin(), known_.end(), [&key](const std::string& a, const std::string& b) {
+          return edit_distance(key, a) < edit_distance(key, b);
+        });
+    const bool close = nearest != known_.end() &&
+                       edit_distance(key, *nearest) <= std::max<std::size_t>(3, key.size() / 3);
     return close ? "; did you mean '" + *nearest + "'?" : "";
   }
 
@@ -197,17 +225,32 @@ class Loader final : public ConfigFields {
 /// Writes what is described to it as YAML.
 class Printer final : public ConfigFields {
  public:
-  explicit Printer(std::ostream& out, int depth = 0) : out_(out), indent_(static_cast<std::size_t>(depth) * 2, ' '), depth_(depth) {}
+  explicit Printer(std::ostream& out, int depth = 0)
+      : out_(out), indent_(static_cast<std::size_t>(depth) * 2, ' '), depth_(depth) {}
 
-  void number(const std::string& key, double& value, const std::string& doc, Bounds) override { line(key, number_text(value), doc); }
+  void number(const std::string& key, double& value, const std::string& doc, Bounds) override {
+    line(key, number_text(value), doc);
+  }
 
-  void integer(const std::string& key, std::int64_t& value, const std::string& doc, Bounds) override { line(key, std::to_string(value), doc); }
+  void integer(const std::string& key,
+               std::int64_t& value,
+               const std::string& doc,
+               Bounds) override {
+    line(key, std::to_string(value), doc);
+  }
 
-  void flag(const std::string& key, bool& value, const std::string& doc) override { line(key, value ? "true" : "false", doc); }
+  void flag(const std::string& key, bool& value, const std::string& doc) override {
+    line(key, value ? "true" : "false", doc);
+  }
 
-  void text(const std::string& key, std::string& value, const std::string& doc) override { line(key, quoted(value), doc); }
+  void text(const std::string& key, std::string& value, const std::string& doc) override {
+    line(key, quoted(value), doc);
+  }
 
-  void choice(const std::string& key, std::string& value, const std::string& doc, const std::vector<std::string>& choices) override {
+  void choice(const std::string& key,
+              std::string& value,
+              const std::string& doc,
+              const std::vector<std::string>& choices) override {
     std::string list;
     for (const std::string& each : choices) {
       list += (list.empty() ? "" : " | ") + each;
@@ -215,11 +258,19 @@ class Printer final : public ConfigFields {
     line(key, value, doc + " (" + list + ")");
   }
 
-  void vector3(const std::string& key, Eigen::Vector3d& value, const std::string& doc, Bounds) override {
-    line(key, "[" + number_text(value.x()) + ", " + number_text(value.y()) + ", " + number_text(value.z()) + "]", doc);
+  void vector3(const std::string& key,
+               Eigen::Vector3d& value,
+               const std::string& doc,
+               Bounds) override {
+    line(key,
+         "[" + number_text(value.x()) + ", " + number_text(value.y()) + ", " +
+             number_text(value.z()) + "]",
+         doc);
   }
 
-  void texts(const std::string& key, std::vector<std::string>& values, const std::string& doc) override {
+  void texts(const std::string& key,
+             std::vector<std::string>& values,
+             const std::string& doc) override {
     std::string list;
     for (const std::string& each : values) {
       list += (list.empty() ? "" : ", ") + quoted(each);
@@ -227,16 +278,26 @@ class Printer final : public ConfigFields {
     line(key, "[" + list + "]", doc);
   }
 
-  void section(const std::string& key, const std::string& doc, const std::function<void(ConfigFields&)>& describe_section) override {
+  void section(const std::string& key,
+               const std::string& doc,
+               const std::function<void(ConfigFields&)>& describe_section) override {
     out_ << (depth_ == 0 ? "\n" : "") << indent_ << key << ":  # " << doc << "\n";
     Printer below(out_, depth_ + 1);
     describe_section(below);
   }
 
- private:
-  static std::string quoted(const std::string& text) { return "\"" + text + "\""; }
+  void other_section(const std::string&) override {}
 
-  void line(const std::string& key, const std::string& value, const std::string& doc) { out_ << indent_ << key << ": " << value << "  # " << doc << "\n"; }
+ private:
+  static std::string quoted(const std::string& text) {
+    YAML::Emitter emitter;
+    emitter << YAML::DoubleQuoted << text;
+    return emitter.c_str();
+  }
+
+  void line(const std::string& key, const std::string& value, const std::string& doc) {
+    out_ << indent_ << key << ": " << value << "  # " << doc << "\n";
+  }
 
   std::ostream& out_;
   std::string indent_;
@@ -249,11 +310,14 @@ YAML::Node parse(const std::function<YAML::Node()>& load, const std::string& nam
   } catch (const YAML::BadFile&) {
     throw ConfigError(name + ": cannot be read: no such file, or no permission");
   } catch (const YAML::ParserException& error) {
-    throw ConfigError(name + ":" + std::to_string(error.mark.line + 1) + ": is not YAML: " + error.msg);
+    throw ConfigError(name + ":" + std::to_string(error.mark.line + 1) +
+                      ": is not YAML: " + error.msg);
   }
 }
 
-void visit(const YAML::Node& root, const std::string& name, const std::function<void(ConfigFields&)>& document) {
+void visit(const YAML::Node& root,
+           const std::string& name,
+           const std::function<void(ConfigFields&)>& document) {
   Loader loader(root, name, "");
   document(loader);
   loader.reject_unknown_keys();
@@ -261,13 +325,16 @@ void visit(const YAML::Node& root, const std::string& name, const std::function<
 
 }  // namespace
 
-void load_config(const std::vector<std::string>& files, const std::function<void(ConfigFields&)>& document) {
+void load_config(const std::vector<std::string>& files,
+                 const std::function<void(ConfigFields&)>& document) {
   for (const std::string& file : files) {
     visit(parse([&file] { return YAML::LoadFile(file); }, file), file, document);
   }
 }
 
-void load_config_text(const std::string& yaml, const std::string& name, const std::function<void(ConfigFields&)>& document) {
+void load_config_text(const std::string& yaml,
+                      const std::string& name,
+                      const std::function<void(ConfigFields&)>& document) {
   visit(parse([&yaml] { return YAML::Load(yaml); }, name), name, document);
 }
 

@@ -10,6 +10,8 @@ Pose interpolate(const Pose& from, const Pose& to, double fraction) {
   return {from.q.slerp(fraction, to.q), from.p + fraction * (to.p - from.p)};
 }
 
-Pose YawPose::pose() const { return {from_yaw(yaw_rad), p}; }
+Pose YawPose::pose() const {
+  return {from_yaw(yaw_rad), p};
+}
 
 }  // namespace trigpoint

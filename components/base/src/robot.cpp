@@ -16,11 +16,21 @@ Eigen::Quaterniond RobotConfig::q_base_imu() const {
 }
 
 void describe(RobotConfig& config, ConfigFields& fields) {
-  fields.vector3("lidar_position_base_m", config.lidar_position_base_m, "LiDAR origin in base_link (at the IMU), x forward, y left, z up");
-  fields.vector3("lidar_roll_pitch_yaw_base_rad", config.lidar_roll_pitch_yaw_base_rad, "R_base_lidar = Rz(yaw) Ry(pitch) Rx(roll)");
-  fields.vector3("antenna_position_base_m", config.antenna_position_base_m, "GPS antenna's phase centre in base_link (the lever arm)");
-  fields.vector3("imu_roll_pitch_yaw_base_rad", config.imu_roll_pitch_yaw_base_rad, "R_base_imu, when the IMU is mounted turned");
-  fields.text("points_topic", config.points_topic, "PointCloud2, in a log or on the bus, without a leading slash");
+  fields.vector3("lidar_position_base_m",
+                 config.lidar_position_base_m,
+                 "LiDAR origin in base_link (at the IMU), x forward, y left, z up");
+  fields.vector3("lidar_roll_pitch_yaw_base_rad",
+                 config.lidar_roll_pitch_yaw_base_rad,
+                 "R_base_lidar = Rz(yaw) Ry(pitch) Rx(roll)");
+  fields.vector3("antenna_position_base_m",
+                 config.antenna_position_base_m,
+                 "GPS antenna's phase centre in base_link (the lever arm)");
+  fields.vector3("imu_roll_pitch_yaw_base_rad",
+                 config.imu_roll_pitch_yaw_base_rad,
+                 "R_base_imu, when the IMU is mounted turned");
+  fields.text("points_topic",
+              config.points_topic,
+              "PointCloud2, in a log or on the bus, without a leading slash");
   fields.text("imu_topic", config.imu_topic, "Imu");
   fields.text("fix_topic", config.fix_topic, "NavSatFix");
 }

@@ -20,7 +20,8 @@ Eigen::Matrix3d hat(const Eigen::Vector3d& a) {
 Eigen::Quaterniond so3_exp(const Eigen::Vector3d& rotation_rad) {
   const double angle = rotation_rad.norm();
   const double half = 0.5 * angle;
-  const double scale = angle < kSmallAngle_rad ? 0.5 - angle * angle / 48.0 : std::sin(half) / angle;
+  const double scale =
+      angle < kSmallAngle_rad ? 0.5 - angle * angle / 48.0 : std::sin(half) / angle;
   Eigen::Quaterniond q;
   q.w() = std::cos(half);
   q.vec() = scale * rotation_rad;

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <Eigen/Core>
+
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -35,26 +36,47 @@ class ConfigFields {
  public:
   virtual ~ConfigFields() = default;
 
-  virtual void number(const std::string& key, double& value, const std::string& doc, Bounds bounds = {}) = 0;
-  virtual void integer(const std::string& key, std::int64_t& value, const std::string& doc, Bounds bounds = {}) = 0;
+  virtual void number(const std::string& key,
+                      double& value,
+                      const std::string& doc,
+                      Bounds bounds = {}) = 0;
+  virtual void integer(const std::string& key,
+                       std::int64_t& value,
+                       const std::string& doc,
+                       Bounds bounds = {}) = 0;
   virtual void flag(const std::string& key, bool& value, const std::string& doc) = 0;
   virtual void text(const std::string& key, std::string& value, const std::string& doc) = 0;
   /// `value` must be one of `choices`.
-  virtual void choice(const std::string& key, std::string& value, const std::string& doc, const std::vector<std::string>& choices) = 0;
+  virtual void choice(const std::string& key,
+                      std::string& value,
+                      const std::string& doc,
+                      const std::vector<std::string>& choices) = 0;
   /// A sequence of exactly three numbers.
-  virtual void vector3(const std::string& key, Eigen::Vector3d& value, const std::string& doc, Bounds bounds = {}) = 0;
+  virtual void vector3(const std::string& key,
+                       Eigen::Vector3d& value,
+                       const std::string& doc,
+                       Bounds bounds = {}) = 0;
   /// A sequence of any length.
-  virtual void texts(const std::string& key, std::vector<std::string>& values, const std::string& doc) = 0;
+  virtual void texts(const std::string& key,
+                     std::vector<std::string>& values,
+                     const std::string& doc) = 0;
   /// A mapping below this one.
-  virtual void section(const std::string& key, const std::string& doc, const std::function<void(ConfigFields&)>& describe_section) = 0;
+  virtual void section(const std::string& key,
+                       const std::string& doc,
+                       const std::function<void(ConfigFields&)>& describe_section) = 0;
+  /// A mapping that another program reads: allowed, and left alone.
+  virtual void other_section(const std::string& key) = 0;
 };
 
 /// `document` visits every section of the program's configuration. Values in `files` overwrite
 /// the defaults, later files win. Throws ConfigError naming file, line, key, rule and nearest key.
-void load_config(const std::vector<std::string>& files, const std::function<void(ConfigFields&)>& document);
+void load_config(const std::vector<std::string>& files,
+                 const std::function<void(ConfigFields&)>& document);
 
 /// The same for YAML text; `name` stands for the file in errors.
-void load_config_text(const std::string& yaml, const std::string& name, const std::function<void(ConfigFields&)>& document);
+void load_config_text(const std::string& yaml,
+                      const std::string& name,
+                      const std::function<void(ConfigFields&)>& document);
 
 /// YAML with every key, its value and its documentation as a comment.
 std::string print_config(const std::function<void(ConfigFields&)>& document);

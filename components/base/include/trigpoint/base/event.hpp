@@ -2,17 +2,18 @@
 // Copyright the Trigpoint developers
 #pragma once
 
+#include "trigpoint/base/time.hpp"
+
 #include <cstdint>
 #include <string>
 #include <vector>
-
-#include "trigpoint/base/time.hpp"
 
 namespace trigpoint {
 
 enum class Severity : std::uint8_t { kInfo, kWarning, kError };
 
-/// What a core has to say. Cores return events; the shell that runs them logs (rate-limited by `code`).
+/// What a core has to say. Cores return events; the shell that runs them logs (rate-limited by
+/// `code`).
 struct Event {
   Severity severity{Severity::kInfo};
   Nanoseconds stamp_ns{0};  ///< data time

@@ -3,15 +3,16 @@
 // What the sensors say: the plain twins of the ROS 2 messages Imu, NavSatFix and PointCloud2.
 #pragma once
 
+#include "trigpoint/base/time.hpp"
+
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+
 #include <cstdint>
 #include <limits>
 #include <optional>
 #include <string>
 #include <vector>
-
-#include "trigpoint/base/time.hpp"
 
 namespace trigpoint {
 
@@ -20,9 +21,9 @@ inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 struct ImuSample {
   Nanoseconds stamp_ns{0};
   std::string frame_id;
-  Eigen::Vector3d gyro_radps{Eigen::Vector3d::Zero()};   ///< angular rate, sensor frame
-  Eigen::Vector3d accel_mps2{Eigen::Vector3d::Zero()};   ///< specific force, +g on z at rest
-  std::optional<Eigen::Quaterniond> q_world_base;        ///< attitude, when the sensor gives one
+  Eigen::Vector3d gyro_radps{Eigen::Vector3d::Zero()};  ///< angular rate, sensor frame
+  Eigen::Vector3d accel_mps2{Eigen::Vector3d::Zero()};  ///< specific force, +g on z at rest
+  std::optional<Eigen::Quaterniond> q_world_base;       ///< attitude, when the sensor gives one
 };
 
 enum class FixStatus : std::int8_t { kUnknown = -2, kNoFix = -1, kFix = 0, kSbas = 1, kGbas = 2 };
@@ -56,7 +57,8 @@ struct PointField {
   std::uint32_t count{1};
 };
 
-/// PointCloud2 as it came: bytes with a description. Decoded by field name, never by a fixed struct.
+/// PointCloud2 as it came: bytes with a description. Decoded by field name, never by a fixed
+/// struct.
 struct PointCloudMessage {
   Nanoseconds stamp_ns{0};
   std::string frame_id;
@@ -82,7 +84,10 @@ struct PointXyzi {
 /// Decoded points in one frame at one time; the owner of the cloud says which.
 using PointCloud = std::vector<PointXyzi>;
 
-/// What a source holds for `xyz + intensity` points as a PointCloud2 (fields x y z intensity, float32).
-PointCloudMessage to_cloud_message(const PointCloud& cloud, Nanoseconds stamp_ns, const std::string& frame_id);
+/// What a source holds for `xyz + intensity` points as a PointCloud2 (fields x y z intensity,
+/// float32).
+PointCloudMessage to_cloud_message(const PointCloud& cloud,
+                                   Nanoseconds stamp_ns,
+                                   const std::string& frame_id);
 
 }  // namespace trigpoint

@@ -4,16 +4,17 @@
 // A component's core takes and returns these; the process shells convert them to the wire.
 #pragma once
 
+#include "trigpoint/base/measurements.hpp"
+#include "trigpoint/base/pose.hpp"
+#include "trigpoint/base/time.hpp"
+
 #include <Eigen/Core>
+
 #include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
-
-#include "trigpoint/base/measurements.hpp"
-#include "trigpoint/base/pose.hpp"
-#include "trigpoint/base/time.hpp"
 
 namespace trigpoint {
 
@@ -35,8 +36,8 @@ struct Odometry {
 struct Datum {
   double latitude_deg{kNaN};
   double longitude_deg{kNaN};
-  double height_m{kNaN};           ///< above the WGS 84 ellipsoid
-  Nanoseconds elected_ns{0};       ///< data time; 0 = given by configuration, which is older than any
+  double height_m{kNaN};      ///< above the WGS 84 ellipsoid
+  Nanoseconds elected_ns{0};  ///< data time; 0 = given by configuration, which is older than any
 
   /// Equal for equal places: "lat lon h" with 1e-9 degree and 1e-4 m.
   std::string id() const;
@@ -58,7 +59,7 @@ struct ResetInfo {
 
 struct GpsStatus {
   Nanoseconds stamp_ns{0};
-  std::string source;    ///< program and version, e.g. "ekf15"
+  std::string source;  ///< program and version, e.g. "ekf15"
   GpsHealth health{GpsHealth::kInit};
   std::string datum_id;  ///< empty until there is a datum
   GnssClass gnss_class{GnssClass::kNone};
@@ -78,28 +79,28 @@ struct GpsStatus {
 enum class LioHealth : std::uint8_t { kInit, kOk, kDegraded, kLost, kStale };
 
 struct LioStatus {
-  Nanoseconds stamp_ns{0};        ///< of the newest scan's last point
-  std::uint32_t odom_epoch{0};    ///< a new number: odom has a new origin
+  Nanoseconds stamp_ns{0};      ///< of the newest scan's last point
+  std::uint32_t odom_epoch{0};  ///< a new number: odom has a new origin
   LioHealth health{LioHealth::kInit};
   /// Share of the prior variance that the newest scan removed, axes of odom, x y z roll pitch yaw:
   /// 1 well constrained, 0 not seen at all.
   std::array<double, 6> observability{};
   std::array<double, 6> sigma{};  ///< m and rad, relative to the local map
   ResetInfo reset;
-  bool aligned{false};            ///< T_map_odom holds
+  bool aligned{false};  ///< T_map_odom holds
   YawPose T_map_odom;
   /// Order yaw, x, y, z.
   Eigen::Matrix4d T_map_odom_covariance{Eigen::Matrix4d::Identity() * kUnknownVariance};
   std::uint64_t rows_applied{0};
   std::uint64_t rows_refused{0};
-  std::string last_refusal;       ///< why, and of which stamp
+  std::string last_refusal;  ///< why, and of which stamp
   Nanoseconds last_row_fix_ns{0};
   std::uint64_t scans_received{0};
   std::uint64_t scans_used{0};
   std::vector<NamedCount> scans_refused;  ///< by reason
   std::uint64_t imu_received{0};
-  double distance_m{0.0};         ///< driven since the epoch began
-  double scan_ms{0.0};            ///< processing time of the newest scan, filled by the shell
+  double distance_m{0.0};  ///< driven since the epoch began
+  double scan_ms{0.0};     ///< processing time of the newest scan, filled by the shell
 };
 
 enum class AxisDecision : std::uint8_t { kLio, kFused, kCoast };
@@ -127,9 +128,9 @@ enum class AxisSource : std::uint8_t { kNone, kLio, kFused, kGps };
 
 struct AxisStatus {
   AxisSource source{AxisSource::kNone};
-  double sigma_m{kNaN};      ///< of the GPS odometry
+  double sigma_m{kNaN};  ///< of the GPS odometry
   double threshold_m{kNaN};
-  std::string reason;        ///< e.g. "sigma 0.62 m > threshold 0.50 m"
+  std::string reason;  ///< e.g. "sigma 0.62 m > threshold 0.50 m"
 };
 
 struct FixVerdict {

@@ -37,8 +37,8 @@ struct YawPose {
   Pose pose() const;
 };
 
-/// Covariance of a pose, order x y z (m), roll pitch yaw (rad, fixed axes of the parent frame) as in
-/// ROS; blocks that are not known are kUnknownVariance on their diagonal, never 0.
+/// Covariance of a pose, order x y z (m), roll pitch yaw (rad, fixed axes of the parent frame) as
+/// in ROS; blocks that are not known are kUnknownVariance on their diagonal, never 0.
 using PoseCovariance = Eigen::Matrix<double, 6, 6>;
 
 inline constexpr double kUnknownVariance = 1e6;

@@ -2,10 +2,11 @@
 // Copyright the Trigpoint developers
 #pragma once
 
-#include <Eigen/Core>
-#include <string>
-
 #include "trigpoint/base/pose.hpp"
+
+#include <Eigen/Core>
+
+#include <string>
 
 namespace trigpoint {
 
@@ -17,7 +18,8 @@ struct RobotConfig {
   Eigen::Vector3d lidar_position_base_m{0.0, 0.0, 0.0};
   Eigen::Vector3d lidar_roll_pitch_yaw_base_rad{0.0, 0.0, 0.0};
   Eigen::Vector3d antenna_position_base_m{0.0, 0.0, 0.0};
-  /// Rotation from the IMU's axes to base_link's (x forward, y left, z up); base_link is at the IMU.
+  /// Rotation from the IMU's axes to base_link's (x forward, y left, z up); base_link is at the
+  /// IMU.
   Eigen::Vector3d imu_roll_pitch_yaw_base_rad{0.0, 0.0, 0.0};
   std::string points_topic{"points"};
   std::string imu_topic{"imu/data"};

@@ -7,7 +7,8 @@
 
 namespace trigpoint {
 
-/// A moment or a duration in integer nanoseconds: the sensor's stamp, never arrival time unless named so.
+/// A moment or a duration in integer nanoseconds: the sensor's stamp, never arrival time unless
+/// named so.
 using Nanoseconds = std::int64_t;
 
 inline constexpr Nanoseconds kNanosecondsPerSecond = 1'000'000'000;

@@ -2,16 +2,16 @@
 // Copyright the Trigpoint developers
 #pragma once
 
-#include <memory>
-#include <optional>
-#include <string>
-#include <vector>
-
 #include "trigpoint/base/event.hpp"
 #include "trigpoint/base/measurements.hpp"
 #include "trigpoint/base/messages.hpp"
 #include "trigpoint/base/robot.hpp"
 #include "trigpoint/fusion_gate/config.hpp"
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
 
 namespace trigpoint::fusion_gate {
 

@@ -4,12 +4,13 @@
 // writers of files.
 #pragma once
 
+#include "trigpoint/base/messages.hpp"
+
 #include <Eigen/Core>
+
 #include <memory>
 #include <optional>
 #include <string>
-
-#include "trigpoint/base/messages.hpp"
 
 namespace trigpoint::geodesy {
 
@@ -41,7 +42,8 @@ class LocalFrame {
 
   Geographic to_geographic(const Eigen::Vector3d& position_map_m) const;
 
-  /// Columns: the axes of the local ENU at `place`, in map. Turns a fix's covariance into map's axes.
+  /// Columns: the axes of the local ENU at `place`, in map. Turns a fix's covariance into map's
+  /// axes.
   Eigen::Matrix3d R_map_enu(const Geographic& place) const;
 
  private:

@@ -2,15 +2,15 @@
 // Copyright the Trigpoint developers
 #pragma once
 
-#include <memory>
-#include <optional>
-#include <vector>
-
 #include "trigpoint/base/event.hpp"
 #include "trigpoint/base/measurements.hpp"
 #include "trigpoint/base/messages.hpp"
 #include "trigpoint/base/robot.hpp"
 #include "trigpoint/gps_odometry/config.hpp"
+
+#include <memory>
+#include <optional>
+#include <vector>
 
 namespace trigpoint::gps_odometry {
 
@@ -22,8 +22,8 @@ struct Output {
   Events events;
 };
 
-/// NavSatFix + IMU -> position odometry with covariance in `map`. Deterministic, single-threaded, no
-/// clock: data time is what the inputs' stamps say. Never throws on data; every refused input is
+/// NavSatFix + IMU -> position odometry with covariance in `map`. Deterministic, single-threaded,
+/// no clock: data time is what the inputs' stamps say. Never throws on data; every refused input is
 /// counted with its reason in GpsStatus::rejections.
 class GpsOdometry {
  public:

@@ -2,12 +2,12 @@
 // Copyright the Trigpoint developers
 #pragma once
 
+#include "trigpoint/lio_mapper/lio_mapper.hpp"
+
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
-
-#include "trigpoint/lio_mapper/lio_mapper.hpp"
 
 namespace trigpoint::lio_mapper {
 
@@ -28,6 +28,7 @@ class KeyframeWriter {
 
 /// Calls `visit` with every keyframe in order of time. Throws std::runtime_error when the file
 /// cannot be read. Returns the number of keyframes.
-std::uint64_t read_keyframes(const std::string& file, const std::function<void(const Keyframe&)>& visit);
+std::uint64_t read_keyframes(const std::string& file,
+                             const std::function<void(const Keyframe&)>& visit);
 
 }  // namespace trigpoint::lio_mapper

@@ -2,17 +2,17 @@
 // Copyright the Trigpoint developers
 #pragma once
 
-#include <cstdint>
-#include <memory>
-#include <optional>
-#include <string>
-#include <vector>
-
 #include "trigpoint/base/event.hpp"
 #include "trigpoint/base/measurements.hpp"
 #include "trigpoint/base/messages.hpp"
 #include "trigpoint/base/robot.hpp"
 #include "trigpoint/lio_mapper/config.hpp"
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
 
 namespace trigpoint::lio_mapper {
 
@@ -30,9 +30,9 @@ struct Keyframe {
 
 /// One sweep that went through the filter.
 struct ScanResult {
-  Odometry odometry;        ///< base_link in odom at the sweep's last point
+  Odometry odometry;  ///< base_link in odom at the sweep's last point
   LioStatus status;
-  PointCloud points_odom;   ///< registered points (undistorted, down-sampled as configured)
+  PointCloud points_odom;  ///< registered points (undistorted, down-sampled as configured)
   std::optional<Keyframe> keyframe;
 };
 

@@ -3,6 +3,10 @@
 // One interface for every recorded (or simulated) drive.
 #pragma once
 
+#include "trigpoint/base/event.hpp"
+#include "trigpoint/base/measurements.hpp"
+#include "trigpoint/base/robot.hpp"
+
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -10,10 +14,6 @@
 #include <string>
 #include <variant>
 #include <vector>
-
-#include "trigpoint/base/event.hpp"
-#include "trigpoint/base/measurements.hpp"
-#include "trigpoint/base/robot.hpp"
 
 namespace trigpoint::recording {
 
@@ -29,7 +29,7 @@ using Measurement = std::variant<ImuSample, GnssFix, PointCloudMessage>;
 struct LogEntry {
   Nanoseconds receive_ns{0};  ///< recorded arrival; a sweep arrives with its last point
   Measurement measurement;
-  bool withheld{false};       ///< a fix for scoring only, not to be fed to any filter
+  bool withheld{false};  ///< a fix for scoring only, not to be fed to any filter
 };
 
 struct TopicSummary {
@@ -56,8 +56,10 @@ class LogReader {
   virtual std::optional<LogEntry> next() = 0;
   /// 0 to 1, for progress bars.
   virtual double progress() const = 0;
+
   /// A trajectory file (TUM) with the truth beside the log, if there is one.
   virtual std::optional<std::string> truth_file() const { return std::nullopt; }
+
   /// What the log itself knows of the robot (KITTI's calibration, a scenario's sensors); what the
   /// user's configuration leaves at its default is taken from here.
   virtual std::optional<RobotConfig> robot() const { return std::nullopt; }
