@@ -32,27 +32,31 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
   return row[b.size()];
 }
 
-/// Shortest decimal text that reads back as the same double, with a point so that it stays a
-/// number.
-std::string number_text(double value) {
+/// Shortest decimal text that reads back as the same double.
+std::string shortest_text(double value) {
+  std::array<char, 40> text{};
   for (int digits = 1; digits <= 17; ++digits) {
-    std::array<char, 40> text{};
     std::snprintf(text.data(), text.size(), "%.*g", digits, value);
     if (std::stod(text.data()) == value) {
-      std::string result = text.data();
-      return result.find_first_of(".en") == std::string::npos ? result + ".0" : result;
+      break;
     }
   }
-  return std::to_string(value);
+  return text.data();
+}
+
+/// The same with a point, so that a whole value still shows that the field takes fractions.
+std::string number_text(double value) {
+  const std::string text = shortest_text(value);
+  return text.find_first_of(".en") == std::string::npos ? text + ".0" : text;
 }
 
 std::string bounds_text(const Bounds& bounds) {
   if (std::isinf(bounds.highest)) {
     return bounds.lowest == 0.0                ? "0 or more"
            : bounds.lowest == kPositive.lowest ? "more than 0"
-                                               : "at least " + number_text(bounds.lowest);
+                                               : "at least " + shortest_text(bounds.lowest);
   }
-  return "between " + number_text(bounds.lowest) + " and " + number_text(bounds.highest);
+  return "between " + shortest_text(bounds.lowest) + " and " + shortest_text(bounds.highest);
 }
 
 /// Reads one mapping of one YAML file into the fields that are described to it.

@@ -79,7 +79,7 @@ TEST(Config, an_unknown_section_is_refused) {
 
 TEST(Config, a_value_out_of_its_bounds_is_refused_with_the_rule) {
   EXPECT_THAT(error_of("sample: {gain: 0}\n"), HasSubstr("must be more than 0; is 0"));
-  EXPECT_THAT(error_of("sample: {count: 11}\n"), HasSubstr("must be between 1.0 and 10.0; is 11"));
+  EXPECT_THAT(error_of("sample: {count: 11}\n"), HasSubstr("must be between 1 and 10; is 11"));
   EXPECT_THAT(error_of("sample: {gain: .nan}\n"), HasSubstr("must be finite"));
 }
 
