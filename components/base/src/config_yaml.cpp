@@ -6,8 +6,8 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <numeric>
 #include <set>
 #include <sstream>
@@ -35,13 +35,8 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
 /// Shortest decimal text that reads back as the same double.
 std::string shortest_text(double value) {
   std::array<char, 40> text{};
-  for (int digits = 1; digits <= 17; ++digits) {
-    std::snprintf(text.data(), text.size(), "%.*g", digits, value);
-    if (std::stod(text.data()) == value) {
-      break;
-    }
-  }
-  return text.data();
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
+  return {text.data(), end};
 }
 
 /// The same with a point, so that a whole value still shows that the field takes fractions.
