@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// The saved map, rendered from keyframes, and point cloud files. Library trigpoint::export_map,
+// apart from trigpoint::export so that only who renders maps links PCL.
+#pragma once
+
+#include "trigpoint/base/measurements.hpp"
+#include "trigpoint/base/messages.hpp"
+
+#include <Eigen/Core>
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+namespace trigpoint::exporter {
+
+struct MapReport {
+  std::uint64_t keyframes{0};
+  std::uint64_t keyframes_left_out{0};  ///< of an epoch without alignment when others have one
+  std::uint64_t points_read{0};
+  std::uint64_t points_written{0};
+  std::string frame{"map"};  ///< "odom" when nothing was aligned and no fallback given
+  Eigen::Vector3d lowest_m{Eigen::Vector3d::Zero()};
+  Eigen::Vector3d highest_m{Eigen::Vector3d::Zero()};
+  std::string
+      remark;  ///< what a reader must know, e.g. why the frame is odom; empty when all is well
+};
+
+/// Renders `keyframes_file` into the binary PCD `out_pcd` (x y z intensity, float32, m). Each
+/// keyframe is placed by its own T_map_odom; those from before the alignment by that of the first
+/// aligned keyframe of the same odom epoch, or by `fallback` (its epoch must match) when none was
+/// aligned. Points are averaged in cubes of `voxel_m`. `progress` gets 0 to 1, may be empty.
+/// Throws std::runtime_error naming the file and the cause.
+MapReport render_map(const std::string& keyframes_file,
+                     const std::optional<Alignment>& fallback,
+                     double voxel_m,
+                     const std::string& out_pcd,
+                     const std::function<void(double)>& progress = {});
+
+/// Binary PCD with x y z intensity.
+void write_pcd(const std::string& file, const PointCloud& cloud);
+
+/// Reads x y z and, when there, intensity.
+PointCloud read_pcd(const std::string& file);
+
+}  // namespace trigpoint::exporter
