@@ -11,6 +11,7 @@
 #include <numeric>
 #include <set>
 #include <sstream>
+#include <utility>
 
 namespace trigpoint {
 
@@ -149,6 +150,27 @@ class Loader final : public ConfigFields {
     below.reject_unknown_keys();
   }
 
+  void list(const std::string& key,
+            std::size_t,
+            const std::string&,
+            const std::function<void(std::size_t)>& resize,
+            const std::function<void(ConfigFields&, std::size_t)>& describe_item) override {
+    const YAML::Node entry = find(key);
+    if (!entry) {
+      return;
+    }
+    if (!entry.IsSequence()) {
+      fail(entry, key, "must be a list of mappings; is " + YAML::Dump(entry));
+    }
+    resize(entry.size());
+    for (std::size_t i = 0; i < entry.size(); ++i) {
+      const std::string item = key + "[" + std::to_string(i) + "]";
+      Loader below(entry[i], file_, path_.empty() ? item : path_ + "." + item);
+      describe_item(below, i);
+      below.reject_unknown_keys();
+    }
+  }
+
   void other_section(const std::string& key) override { find(key); }
 
   void reject_unknown_keys() const {
@@ -224,8 +246,15 @@ class Loader final : public ConfigFields {
 /// Writes what is described to it as YAML.
 class Printer final : public ConfigFields {
  public:
-  explicit Printer(std::ostream& out, int depth = 0)
-      : out_(out), indent_(static_cast<std::size_t>(depth) * 2, ' '), depth_(depth) {}
+  explicit Printer(std::ostream& out, int depth = 0, bool list_item = false)
+      : out_(out),
+        indent_(static_cast<std::size_t>(depth) * 2, ' '),
+        first_indent_(indent_),
+        depth_(depth) {
+    if (list_item) {
+      first_indent_.replace(indent_.size() - 2, 2, "- ");
+    }
+  }
 
   void number(const std::string& key, double& value, const std::string& doc, Bounds) override {
     line(key, number_text(value), doc);
@@ -280,9 +309,22 @@ class Printer final : public ConfigFields {
   void section(const std::string& key,
                const std::string& doc,
                const std::function<void(ConfigFields&)>& describe_section) override {
-    out_ << (depth_ == 0 ? "\n" : "") << indent_ << key << ":  # " << doc << "\n";
+    out_ << (depth_ == 0 ? "\n" : "") << next_indent() << key << ":  # " << doc << "\n";
     Printer below(out_, depth_ + 1);
     describe_section(below);
+  }
+
+  void list(const std::string& key,
+            std::size_t size,
+            const std::string& doc,
+            const std::function<void(std::size_t)>&,
+            const std::function<void(ConfigFields&, std::size_t)>& describe_item) override {
+    out_ << (depth_ == 0 ? "\n" : "") << next_indent() << key << ":" << (size == 0 ? " []" : "")
+         << "  # " << doc << "\n";
+    for (std::size_t i = 0; i < size; ++i) {
+      Printer below(out_, depth_ + 2, true);
+      describe_item(below, i);
+    }
   }
 
   void other_section(const std::string&) override {}
@@ -295,11 +337,15 @@ class Printer final : public ConfigFields {
   }
 
   void line(const std::string& key, const std::string& value, const std::string& doc) {
-    out_ << indent_ << key << ": " << value << "  # " << doc << "\n";
+    out_ << next_indent() << key << ": " << value << "  # " << doc << "\n";
   }
+
+  /// The first line of a list's item carries its dash.
+  std::string next_indent() { return std::exchange(first_indent_, indent_); }
 
   std::ostream& out_;
   std::string indent_;
+  std::string first_indent_;
   int depth_;
 };
 

@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -64,6 +65,13 @@ class ConfigFields {
   virtual void section(const std::string& key,
                        const std::string& doc,
                        const std::function<void(ConfigFields&)>& describe_section) = 0;
+  /// A sequence of mappings, which replaces the default as a whole: loading calls `resize` with the
+  /// number of items in the file, then `describe_item` for each; printing describes `size` items.
+  virtual void list(const std::string& key,
+                    std::size_t size,
+                    const std::string& doc,
+                    const std::function<void(std::size_t)>& resize,
+                    const std::function<void(ConfigFields&, std::size_t)>& describe_item) = 0;
   /// A mapping that another program reads: allowed, and left alone.
   virtual void other_section(const std::string& key) = 0;
 };
