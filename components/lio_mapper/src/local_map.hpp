@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "trigpoint/base/measurements.hpp"
+#include "trigpoint/lio_mapper/config.hpp"
 
 namespace trigpoint::lio_mapper {
 
@@ -31,14 +32,6 @@ class LocalMap {
   virtual PointCloud points() const = 0;
   virtual std::size_t size() const = 0;
   virtual bool empty() const { return size() == 0; }
-};
-
-struct SurfelMapConfig {
-  double leaf_m{0.5};               ///< side of a leaf voxel; a parent is 3 x 3 x 3 leaves
-  std::size_t leaf_capacity{20};    ///< points after which a leaf's mean is frozen
-  double max_flatness{0.03};        ///< smallest over largest eigenvalue of a plane's leaf means
-  double min_linearity{0.1};        ///< middle over largest eigenvalue, so that a line is no plane
-  double max_residual_m{0.5};       ///< farther planes do not explain a point
 };
 
 std::unique_ptr<LocalMap> make_surfel_map(const SurfelMapConfig& config);

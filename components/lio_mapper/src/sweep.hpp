@@ -10,6 +10,7 @@
 
 #include "trigpoint/base/event.hpp"
 #include "trigpoint/base/measurements.hpp"
+#include "trigpoint/lio_mapper/config.hpp"
 
 namespace trigpoint::lio_mapper {
 
@@ -28,20 +29,6 @@ struct Sweep {
   std::vector<TimedPoint> points;
   std::size_t points_received{0};
   std::size_t points_refused{0};  ///< not finite or out of range
-};
-
-/// How an input cloud tells its points' times. Keys of the configuration.
-struct SweepTimingConfig {
-  std::string point_time{"field"};     ///< field | azimuth | snapshot
-  std::string stamp_is{"auto"};        ///< auto | begin | middle | end of the sweep
-  std::string time_field{"auto"};      ///< auto, or the field's name
-  std::string time_unit{"auto"};       ///< auto | s | ms | us | ns
-  double sweep_period_s{0.1};          ///< for azimuth timing
-  double first_azimuth_rad{3.14159265358979};  ///< azimuth timing: where the sweep begins
-  bool clockwise{true};                ///< azimuth timing: seen from above
-  double min_range_m{0.5};
-  double max_range_m{120.0};
-  double time_offset_s{0.0};           ///< added to LiDAR stamps to bring them to the IMU's clock
 };
 
 /// Why a cloud was refused: a short stable code and a sentence with field, value and what was expected.

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 
@@ -13,9 +14,97 @@ class ConfigFields;
 
 namespace trigpoint::lio_mapper {
 
-/// The only defaults of lio_mapper; every field is described (unit, rule) in src/config.cpp.
+/// How an input cloud tells its points' times.
+struct SweepTimingConfig {
+  std::string point_time{"field"};             ///< field | azimuth | snapshot
+  std::string stamp_is{"auto"};                ///< auto | begin | middle | end of the sweep
+  std::string time_field{"auto"};              ///< auto, or the field's name
+  std::string time_unit{"auto"};               ///< auto | s | ms | us | ns
+  double sweep_period_s{0.1};                  ///< for azimuth timing
+  double first_azimuth_rad{3.14159265358979};  ///< azimuth timing: where the sweep begins
+  bool clockwise{true};                        ///< azimuth timing: seen from above
+  double min_range_m{0.5};
+  double max_range_m{120.0};
+  double time_offset_s{0.0};  ///< added to LiDAR stamps to bring them to the IMU's clock
+};
+
+struct SurfelMapConfig {
+  double leaf_m{0.5};             ///< side of a leaf voxel; a parent is 3 x 3 x 3 leaves
+  std::size_t leaf_capacity{20};  ///< points after which a leaf's mean is frozen
+  double max_flatness{0.03};      ///< smallest over largest eigenvalue of a plane's leaf means
+  double min_linearity{0.1};      ///< middle over largest eigenvalue, so that a line is no plane
+  double max_residual_m{0.5};     ///< farther planes do not explain a point
+};
+
+/// Noise of the IMU as the filter sees it: vibration and scale errors included, so larger than a
+/// data sheet's.
+struct ImuConfig {
+  double gyro_noise_radps_sqrthz{2e-3};
+  double accel_noise_mps2_sqrthz{3e-2};
+  double gyro_bias_walk_radps_sqrts{2e-5};
+  double accel_bias_walk_mps2_sqrts{3e-4};
+  double initial_gyro_bias_sigma_radps{0.01};
+  double initial_accel_bias_sigma_mps2{0.05};
+  double max_gap_s{0.1};   ///< longer intervals between samples are bridged with inflated noise
+  double lost_gap_s{0.5};  ///< sweeps that an interval longer than this touches are refused
+  double gap_noise_factor{20.0};
+};
+
+struct StartConfig {
+  double window_s{1.0};        ///< of IMU, before odom is levelled
+  double max_speed_mps{40.0};  ///< forward speeds tried at the start
+  double speed_step_mps{2.0};
+  double rest_speed_mps{0.3};  ///< slower starts count as at rest when the IMU agrees
+};
+
+struct MatchingConfig {
+  double voxel_m{0.5};  ///< down-sampling before matching
+  double range_sigma_m{0.02};
+  double angle_sigma_rad{1.5e-3};  ///< beam direction and divergence: counts at grazing incidence
+  double robust_width{2.0};        ///< residuals beyond this many sigmas lose weight (Huber)
+  double independent_residuals{300.0};  ///< residuals count as at most this many independent ones
+  std::int64_t min_matches{50};
+  std::int64_t max_iterations{5};
+  double converged_position_m{1e-3};
+  double converged_rotation_rad{1e-4};
+  double lost_after_s{2.0};  ///< coasting longer than this is LOST
+};
+
+struct LocalMapConfig {
+  double half_side_m{150.0};  ///< of the cube around the robot that is kept
+  double prune_every_m{10.0};
+  SurfelMapConfig surfel;
+};
+
+/// How fast odom drifts away from the truth: random walk of T_map_odom per metre driven.
+struct DriftConfig {
+  double position_sigma_m_sqrtm{0.02};
+  double yaw_sigma_rad_sqrtm{3.5e-4};
+};
+
+struct RowsConfig {
+  double history_s{1.5};
+  std::int64_t max_waiting{64};
+};
+
+struct KeyframeConfig {
+  double distance_m{1.0};
+  double rotation_rad{0.1745};
+  double interval_s{10.0};  ///< also without motion, so that a standing robot's map is refreshed
+  double voxel_m{0.2};
+};
+
+/// The only defaults of lio_mapper; units and rules are in src/config.cpp.
 struct Config {
-  // Filled in by the implementer of the core.
+  SweepTimingConfig sweep;
+  ImuConfig imu;
+  StartConfig start;
+  MatchingConfig matching;
+  LocalMapConfig local_map;
+  DriftConfig drift;
+  RowsConfig rows;
+  KeyframeConfig keyframes;
+  double imu_rate_odometry_hz{100.0};
 };
 
 void describe(Config& config, ConfigFields& fields);
