@@ -65,9 +65,24 @@ class LogReader {
   virtual std::optional<RobotConfig> robot() const { return std::nullopt; }
 };
 
+/// What is asked of a log.
+struct LogOptions {
+  bool require_points{true};  ///< without this topic the log is refused
+  bool require_imu{true};
+  bool require_fix{true};
+  double fix_rate_limit_hz{0.0};  ///< fixes beyond this rate are delivered as withheld; 0 = all fed
+  double start_s{0.0};            ///< skip this much, s after the log's first entry
+  double duration_s{0.0};         ///< then deliver this much; 0 = to the end
+  /// KITTI only: IMU and fixes are delivered from this long before the first sweep, s.
+  double lead_in_s{3.0};
+};
+
 /// Opens a ROS 1 bag (.bag), a rosbag2 folder or .db3 file, or a KITTI raw drive folder. Throws
 /// LogError when the path does not exist, is empty, is of no known kind, or lacks a mapped topic
 /// (naming it, what is there instead, and the nearest name).
 std::unique_ptr<LogReader> open_log(const std::string& path, const RobotConfig& robot);
+std::unique_ptr<LogReader> open_log(const std::string& path,
+                                    const RobotConfig& robot,
+                                    const LogOptions& options);
 
 }  // namespace trigpoint::recording

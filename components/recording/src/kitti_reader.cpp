@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "kitti_reader.hpp"
+
+#include "kitti_drive.hpp"
+
+#include <algorithm>
+
+namespace trigpoint::recording {
+
+namespace {
+
+constexpr Nanoseconds kAfterLastSweep_ns = 200'000'000;
+
+/// Where an entry's measurement is to be found; sweeps are read from disk when their turn comes.
+struct Arrival {
+  enum class Kind { kImu, kFix, kSweep };
+  Nanoseconds receive_ns;
+  Kind kind;
+  std::size_t index;
+};
+
+class KittiReader : public LogReader {
+ public:
+  KittiReader(KittiDrive drive, const LogOptions& options) : drive_(std::move(drive)) {
+    list_arrivals(options);
+    summarize();
+  }
+
+  const LogSummary& summary() const override { return summary_; }
+
+  std::optional<LogEntry> next() override {
+    if (next_ == arrivals_.size()) {
+      return std::nullopt;
+    }
+    const Arrival& arrival = arrivals_[next_++];
+    LogEntry entry;
+    entry.receive_ns = arrival.receive_ns;
+    switch (arrival.kind) {
+      case Arrival::Kind::kImu:
+        entry.measurement = drive_.imu[arrival.index];
+        break;
+      case Arrival::Kind::kFix:
+        entry.measurement = drive_.fixes[arrival.index];
+        break;
+      case Arrival::Kind::kSweep:
+        entry.measurement = load_kitti_sweep(drive_.sweeps[arrival.index]);
+        break;
+    }
+    return entry;
+  }
+
+  double progress() const override {
+    return arrivals_.empty() ? 1.0
+                             : static_cast<double>(next_) / static_cast<double>(arrivals_.size());
+  }
+
+  std::optional<RobotConfig> robot() const override { return drive_.robot; }
+
+ private:
+  using Kind = Arrival::Kind;
+
+  void list_arrivals(const LogOptions& options) {
+    add(Kind::kImu, drive_.imu);
+    add(Kind::kFix, drive_.fixes);
+    for (std::size_t i = 0; i < drive_.sweeps.size(); ++i) {
+      arrivals_.push_back({drive_.sweeps[i].end_ns, Kind::kSweep, i});
+    }
+    if (!drive_.sweeps.empty()) {
+      keep_between(drive_.sweeps.front().start_ns - from_seconds(options.lead_in_s),
+                   drive_.sweeps.back().end_ns + kAfterLastSweep_ns);
+    }
+    // Equal times: IMU before fix before sweep, as the sources were added.
+    std::stable_sort(arrivals_.begin(), arrivals_.end(), [](const Arrival& a, const Arrival& b) {
+      return a.receive_ns < b.receive_ns;
+    });
+  }
+
+  template <class Stamped>
+  void add(Kind kind, const std::vector<Stamped>& measurements) {
+    Nanoseconds newest_ns = 0;
+    for (std::size_t i = 0; i < measurements.size(); ++i) {
+      newest_ns = std::max(newest_ns, measurements[i].stamp_ns);
+      arrivals_.push_back({newest_ns, kind, i});
+    }
+  }
+
+  void keep_between(Nanoseconds first_ns, Nanoseconds last_ns) {
+    std::erase_if(arrivals_, [&](const Arrival& arrival) {
+      return arrival.receive_ns < first_ns || arrival.receive_ns > last_ns;
+    });
+  }
+
+  std::uint64_t count(Kind kind) const {
+    return static_cast<std::uint64_t>(
+        std::count_if(arrivals_.begin(), arrivals_.end(), [&](const Arrival& arrival) {
+          return arrival.kind == kind;
+        }));
+  }
+
+  void summarize() {
+    summary_.path = drive_.sync_folder.string();
+    summary_.format = "kitti";
+    summary_.topics = {{"velodyne_points", "sensor_msgs/msg/PointCloud2", count(Kind::kSweep)},
+                       {drive_.imu_source, "sensor_msgs/msg/Imu", count(Kind::kImu)},
+                       {"oxts position", "sensor_msgs/msg/NavSatFix", count(Kind::kFix)}};
+    if (!arrivals_.empty()) {
+      summary_.first_ns = arrivals_.front().receive_ns;
+      summary_.last_ns = arrivals_.back().receive_ns;
+    }
+  }
+
+  KittiDrive drive_;
+  LogSummary summary_;
+  std::vector<Arrival> arrivals_;
+  std::size_t next_{0};
+};
+
+void require(bool needed, bool there, const std::filesystem::path& folder, const char* what) {
+  if (needed && !there) {
+    throw LogError(folder.string() + ": this KITTI drive has no " + what);
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<LogReader> open_kitti_drive(const std::filesystem::path& sync_folder,
+                                            const LogOptions& options) {
+  KittiDrive drive = load_kitti_drive(sync_folder);
+  require(options.require_points,
+          !drive.sweeps.empty(),
+          sync_folder,
+          "sweeps (velodyne_points/data/*.bin with lines in timestamps_start.txt)");
+  require(
+      options.require_imu, !drive.imu.empty(), sync_folder, "IMU (imu100.csv or oxts/data/*.txt)");
+  require(options.require_fix, !drive.fixes.empty(), sync_folder, "fixes (oxts/data/*.txt)");
+  return std::make_unique<KittiReader>(std::move(drive), options);
+}
+
+}  // namespace trigpoint::recording

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "trigpoint/recording/log.hpp"
+
+#include "kitti_drive.hpp"
+#include "kitti_reader.hpp"
+#include "log_window.hpp"
+
+#include <filesystem>
+
+namespace trigpoint::recording {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+std::unique_ptr<LogReader> open_by_kind(const fs::path& path,
+                                        const RobotConfig& /*robot*/,
+                                        const LogOptions& options) {
+  if (const auto sync_folder = find_kitti_sync_folder(path)) {
+    return open_kitti_drive(*sync_folder, options);
+  }
+  throw LogError(path.string() +
+                 ": is no log that is known here; expected a ROS 1 bag (.bag), a rosbag2 folder "
+                 "(metadata.yaml, .db3), or a KITTI raw drive (velodyne_points, oxts)");
+}
+
+}  // namespace
+
+std::unique_ptr<LogReader> open_log(const std::string& path,
+                                    const RobotConfig& robot,
+                                    const LogOptions& options) {
+  if (!fs::exists(path)) {
+    throw LogError(path + ": does not exist");
+  }
+  return apply_options(open_by_kind(path, robot, options), options);
+}
+
+std::unique_ptr<LogReader> open_log(const std::string& path, const RobotConfig& robot) {
+  return open_log(path, robot, LogOptions{});
+}
+
+}  // namespace trigpoint::recording
