@@ -76,6 +76,10 @@ class ConfigFields {
   virtual void other_section(const std::string& key) = 0;
 };
 
+/// Every section of the one configuration document, in the order of its print.
+inline constexpr std::array<const char*, 6> kConfigSections{
+    "robot", "bus", "gps_odometry", "lio_mapper", "fusion_gate", "log"};
+
 /// `document` visits every section of the program's configuration. Values in `files` overwrite
 /// the defaults, later files win. Throws ConfigError naming file, line, key, rule and nearest key.
 void load_config(const std::vector<std::string>& files,

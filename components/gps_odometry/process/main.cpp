@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// The process around gps_odometry's ekf15: imu/data and gps/fix in, gps/odometry and gps/status
+// out.
+#include "trigpoint/bus/bus.hpp"
+#include "trigpoint/bus/config.hpp"
+#include "trigpoint/bus/convert.hpp"
+#include "trigpoint/bus/loop.hpp"
+#include "trigpoint/bus/topics.hpp"
+#include "trigpoint/gps_odometry/gps_odometry.hpp"
+#include "trigpoint/pipeline/session_parts.hpp"
+#include "trigpoint/shell/shell.hpp"
+
+#include <chrono>
+#include <optional>
+
+namespace {
+
+using namespace trigpoint;
+namespace topics = bus::topics;
+
+struct Settings {
+  RobotConfig robot;
+  bus::Config bus;
+  gps_odometry::Config filter;
+};
+
+Settings load(const shell::Options& options) {
+  Settings s;
+  shell::load_sections(options.config_files,
+                       {{"robot", [&s](ConfigFields& f) { describe(s.robot, f); }},
+                        {"bus", [&s](ConfigFields& f) { describe(s.bus, f); }},
+                        {"gps_odometry", [&s](ConfigFields& f) { describe(s.filter, f); }}});
+  return s;
+}
+
+bus::DiagnosticLevel level_of(GpsHealth health) {
+  switch (health) {
+    case GpsHealth::kOk:
+      return bus::DiagnosticLevel::kOk;
+    case GpsHealth::kFault:
+      return bus::DiagnosticLevel::kError;
+    case GpsHealth::kStale:
+      return bus::DiagnosticLevel::kStale;
+    default:
+      return bus::DiagnosticLevel::kWarning;
+  }
+}
+
+/// Publishes what the core says; everything here runs on the loop's thread.
+class Process {
+ public:
+  Process(const Settings& settings,
+          const shell::Options& options,
+          const shell::EventLog& log,
+          bus::Loop& loop)
+      : log_(log),
+        disk_(log),
+        core_(settings.filter, settings.robot),
+        participant_(settings.bus, "gps_odometry", log_),
+        odometry_(participant_, topics::gps_odometry),
+        status_(participant_, topics::gps_status),
+        datum_(participant_, topics::datum),
+        diagnostics_(participant_, topics::diagnostics) {
+    if (!options.session.empty()) {
+      exporter::create_session_folder(options.session);
+      session_.emplace(options.session);
+    }
+    publish_datum();
+    datums_.emplace(
+        participant_,
+        topics::datum,
+        [this, &loop](const sensor_msgs::msg::NavSatFix& m, const bus::MessageInfo& info) {
+          if (info.writer_guid != datum_.guid()) {
+            loop.post([this, d = bus::datum_from_message(m)] { take(core_.on_datum(d)); });
+          }
+        });
+    imu_.emplace(participant_,
+                 topics::imu.renamed(settings.robot.imu_topic),
+                 [this, &loop](const sensor_msgs::msg::Imu& m, const bus::MessageInfo&) {
+                   loop.post([this, sample = bus::from_message(m)] { take(core_.on_imu(sample)); });
+                 });
+    fixes_.emplace(participant_,
+                   topics::fix.renamed(settings.robot.fix_topic),
+                   [this, &loop](const sensor_msgs::msg::NavSatFix& m, const bus::MessageInfo&) {
+                     loop.post([this, fix = bus::from_message(m)] { take(core_.on_fix(fix)); });
+                   });
+    loop.every(std::chrono::seconds(1), [this] { diagnose(); });
+  }
+
+  void close() {
+    keep([&] { session_->close(); });
+  }
+
+  bool failed() const { return disk_.failed(); }
+
+ private:
+  template <typename Write>
+  void keep(Write write) {
+    if (session_) {
+      disk_.keep(write);
+    }
+  }
+
+  void take(const gps_odometry::Output& output) {
+    log_(output.events);
+    publish_datum();
+    if (output.odometry) {
+      odometry_.publish(bus::to_message(*output.odometry));
+      keep([&] { session_->on_odometry(*output.odometry); });
+    }
+    if (output.status) {
+      last_ = *output.status;
+      status_.publish(bus::to_message(*output.status));
+      keep([&] { session_->on_status(*output.status); });
+    }
+  }
+
+  /// Elected or adopted: who has a datum publishes it, so that one process's death does not lose
+  /// it.
+  void publish_datum() {
+    const std::optional<Datum> datum = core_.datum();
+    if (datum && datum->id() != published_datum_) {
+      published_datum_ = datum->id();
+      log_.info("datum " + published_datum_);
+      datum_.publish(bus::to_message(*datum));
+      keep([&] { session_->on_datum(*datum); });
+    }
+  }
+
+  void diagnose() {
+    const bus::Diagnostic line{level_of(last_.health),
+                               "gps_odometry: fixes",
+                               "accepted " + std::to_string(last_.fixes_accepted) + " of " +
+                                   std::to_string(last_.fixes_received),
+                               last_.source,
+                               {{"datum", last_.datum_id}}};
+    diagnostics_.publish(bus::to_message(last_.stamp_ns, {&line, 1}));
+  }
+
+  shell::EventLog log_;
+  shell::DiskGuard disk_;
+  gps_odometry::GpsOdometry core_;
+  std::optional<pipeline::GpsPart> session_;
+  GpsStatus last_;
+  std::string published_datum_;
+  bus::Participant participant_;
+  bus::Publisher<nav_msgs::msg::Odometry> odometry_;
+  bus::Publisher<trigpoint_msgs::msg::GpsStatus> status_;
+  bus::Publisher<sensor_msgs::msg::NavSatFix> datum_;
+  bus::Publisher<diagnostic_msgs::msg::DiagnosticArray> diagnostics_;
+  std::optional<bus::Subscription<sensor_msgs::msg::NavSatFix>> datums_;
+  std::optional<bus::Subscription<sensor_msgs::msg::Imu>> imu_;
+  std::optional<bus::Subscription<sensor_msgs::msg::NavSatFix>> fixes_;
+};
+
+int run(const shell::Options& options, const shell::EventLog& log) {
+  const Settings settings = load(options);
+  bus::Loop loop;
+  Process process(settings, options, log, loop);
+  log.info("ready");
+  loop.run();
+  process.close();
+  return process.failed() ? 1 : 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return trigpoint::shell::run_program(
+      argc,
+      argv,
+      "trigpoint_gps_ekf15",
+      "GPS odometry: NavSatFix + IMU -> position with covariance in map (15-state EKF)",
+      run);
+}

@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// The process around lio_mapper: points, imu/data and fusion/state_update in; odometry, clouds, the
+// map and its keyframes out.
+#include "trigpoint/bus/bus.hpp"
+#include "trigpoint/bus/config.hpp"
+#include "trigpoint/bus/convert.hpp"
+#include "trigpoint/bus/loop.hpp"
+#include "trigpoint/bus/topics.hpp"
+#include "trigpoint/lio_mapper/lio_mapper.hpp"
+#include "trigpoint/pipeline/session_parts.hpp"
+#include "trigpoint/shell/shell.hpp"
+
+#include <chrono>
+#include <optional>
+
+namespace {
+
+using namespace trigpoint;
+namespace topics = bus::topics;
+using Clock = std::chrono::steady_clock;
+
+constexpr std::chrono::seconds kMapPeriod{5};  ///< the latched local map, while somebody listens
+
+struct Settings {
+  RobotConfig robot;
+  bus::Config bus;
+  lio_mapper::Config mapper;
+};
+
+Settings load(const shell::Options& options) {
+  Settings s;
+  shell::load_sections(options.config_files,
+                       {{"robot", [&s](ConfigFields& f) { describe(s.robot, f); }},
+                        {"bus", [&s](ConfigFields& f) { describe(s.bus, f); }},
+                        {"lio_mapper", [&s](ConfigFields& f) { describe(s.mapper, f); }}});
+  return s;
+}
+
+bus::DiagnosticLevel level_of(LioHealth health) {
+  switch (health) {
+    case LioHealth::kOk:
+      return bus::DiagnosticLevel::kOk;
+    case LioHealth::kLost:
+      return bus::DiagnosticLevel::kError;
+    case LioHealth::kStale:
+      return bus::DiagnosticLevel::kStale;
+    default:
+      return bus::DiagnosticLevel::kWarning;
+  }
+}
+
+/// Publishes what the core says; everything but the conversions runs on the loop's thread.
+class Process {
+ public:
+  Process(const Settings& settings,
+          const shell::Options& options,
+          const shell::EventLog& log,
+          bus::Loop& loop)
+      : log_(log),
+        disk_(log),
+        core_(settings.mapper, settings.robot),
+        participant_(settings.bus, "lio_mapper", log_),
+        odometry_(participant_, topics::lio_odometry),
+        imu_rate_(participant_, topics::lio_odometry_imu_rate),
+        status_(participant_, topics::lio_status),
+        cloud_(participant_, topics::cloud_registered),
+        map_(participant_, topics::map),
+        tf_(participant_, topics::tf),
+        tf_static_(participant_, topics::tf_static),
+        diagnostics_(participant_, topics::diagnostics) {
+    if (!options.session.empty()) {
+      exporter::create_session_folder(options.session);
+      session_.emplace(options.session);
+    }
+    publish_extrinsics(settings.robot);
+    updates_.emplace(
+        participant_,
+        topics::state_update,
+        [this, &loop](const trigpoint_msgs::msg::StateUpdate& m, const bus::MessageInfo&) {
+          loop.post([this, update = bus::from_message(m)] {
+            take([&] { return core_.on_state_update(update); });
+          });
+        });
+    imu_.emplace(participant_,
+                 topics::imu.renamed(settings.robot.imu_topic),
+                 [this, &loop](const sensor_msgs::msg::Imu& m, const bus::MessageInfo&) {
+                   loop.post([this, sample = bus::from_message(m)] {
+                     take([&] { return core_.on_imu(sample); });
+                   });
+                 });
+    points_.emplace(participant_,
+                    topics::points.renamed(settings.robot.points_topic),
+                    [this, &loop](sensor_msgs::msg::PointCloud2& m, const bus::MessageInfo&) {
+                      loop.post([this, cloud = bus::from_message(std::move(m))] {
+                        take([&] { return core_.on_cloud(cloud); });
+                      });
+                    });
+    loop.every(std::chrono::seconds(1), [this] { report_health(); });
+    loop.every(kMapPeriod, [this] { publish_map(); });
+  }
+
+  /// After the loop: what still waits for IMU samples is processed and written.
+  void close() {
+    take([this] { return core_.finish(); });
+    keep([&] { session_->close(core_.status()); });
+    publish_map();
+  }
+
+  bool failed() const { return disk_.failed(); }
+
+ private:
+  template <typename Feed>
+  void take(Feed feed) {
+    const Clock::time_point before = Clock::now();
+    lio_mapper::Output output = feed();
+    const double elapsed_ms =
+        std::chrono::duration<double, std::milli>(Clock::now() - before).count();
+    log_(output.events);
+    for (lio_mapper::ScanResult& scan : output.scans) {
+      scan.status.scan_ms = elapsed_ms / static_cast<double>(output.scans.size());
+      publish(scan);
+      keep([&] { session_->on_scan(scan); });
+    }
+    if (output.odometry_imu_rate) {
+      imu_rate_.publish(bus::to_message(*output.odometry_imu_rate));
+    }
+  }
+
+  void publish(const lio_mapper::ScanResult& scan) {
+    last_ = scan.status;
+    odometry_.publish(bus::to_message(scan.odometry));
+    status_.publish(bus::to_message(scan.status));
+    const bus::StampedTransform transform{scan.odometry.stamp_ns,
+                                          scan.odometry.frame_id,
+                                          scan.odometry.child_frame_id,
+                                          scan.odometry.T_frame_child};
+    tf_.publish(bus::to_tf_message({&transform, 1}));
+    if (cloud_.matched() > 0) {
+      cloud_.publish(bus::to_message(
+          to_cloud_message(scan.points_odom, scan.odometry.stamp_ns, scan.odometry.frame_id)));
+    }
+  }
+
+  void publish_extrinsics(const RobotConfig& robot) {
+    const std::array<bus::StampedTransform, 2> transforms{
+        bus::StampedTransform{0, "base_link", "lidar", robot.T_base_lidar()},
+        bus::StampedTransform{0,
+                              "base_link",
+                              "gnss_antenna",
+                              Pose(Eigen::Quaterniond::Identity(), robot.antenna_position_base_m)}};
+    tf_static_.publish(bus::to_tf_message(transforms));
+  }
+
+  void publish_map() {
+    if (map_.matched() > 0) {
+      map_.publish(bus::to_message(to_cloud_message(core_.local_map(), last_.stamp_ns, "odom")));
+    }
+  }
+
+  /// Also between scans, so that who waits for the mapper hears that it lives and what it lacks.
+  void report_health() {
+    const LioStatus status = core_.status();
+    if (status.scans_used == reported_scans_) {
+      status_.publish(bus::to_message(status));
+    }
+    reported_scans_ = status.scans_used;
+    const bus::Diagnostic line{level_of(status.health),
+                               "lio_mapper: scans",
+                               "used " + std::to_string(status.scans_used) + " of " +
+                                   std::to_string(status.scans_received),
+                               "",
+                               {{"imu samples", std::to_string(status.imu_received)},
+                                {"odom epoch", std::to_string(status.odom_epoch)}}};
+    diagnostics_.publish(bus::to_message(status.stamp_ns, {&line, 1}));
+  }
+
+  template <typename Write>
+  void keep(Write write) {
+    if (session_) {
+      disk_.keep(write);
+    }
+  }
+
+  shell::EventLog log_;
+  shell::DiskGuard disk_;
+  lio_mapper::LioMapper core_;
+  std::optional<pipeline::MapperPart> session_;
+  LioStatus last_;
+  std::uint64_t reported_scans_{0};
+  bus::Participant participant_;
+  bus::Publisher<nav_msgs::msg::Odometry> odometry_;
+  bus::Publisher<nav_msgs::msg::Odometry> imu_rate_;
+  bus::Publisher<trigpoint_msgs::msg::LioStatus> status_;
+  bus::Publisher<sensor_msgs::msg::PointCloud2> cloud_;
+  bus::Publisher<sensor_msgs::msg::PointCloud2> map_;
+  bus::Publisher<tf2_msgs::msg::TFMessage> tf_;
+  bus::Publisher<tf2_msgs::msg::TFMessage> tf_static_;
+  bus::Publisher<diagnostic_msgs::msg::DiagnosticArray> diagnostics_;
+  std::optional<bus::Subscription<trigpoint_msgs::msg::StateUpdate>> updates_;
+  std::optional<bus::Subscription<sensor_msgs::msg::Imu>> imu_;
+  std::optional<bus::Subscription<sensor_msgs::msg::PointCloud2>> points_;
+};
+
+int run(const shell::Options& options, const shell::EventLog& log) {
+  const Settings settings = load(options);
+  bus::Loop loop;
+  Process process(settings, options, log, loop);
+  log.info("ready");
+  loop.run();
+  process.close();
+  return process.failed() ? 1 : 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return trigpoint::shell::run_program(
+      argc,
+      argv,
+      "trigpoint_lio_mapper",
+      "LiDAR-inertial mapper: points + IMU -> odometry with covariance, registered clouds, the map",
+      run);
+}

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// The three cores in one process: every input goes through all of them before the next one comes.
+#pragma once
+
+#include "trigpoint/base/event.hpp"
+#include "trigpoint/base/messages.hpp"
+#include "trigpoint/base/robot.hpp"
+#include "trigpoint/fusion_gate/config.hpp"
+#include "trigpoint/gps_odometry/config.hpp"
+#include "trigpoint/lio_mapper/config.hpp"
+#include "trigpoint/lio_mapper/lio_mapper.hpp"
+#include "trigpoint/recording/log.hpp"
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+namespace trigpoint::pipeline {
+
+struct CoreConfigs {
+  RobotConfig robot;
+  gps_odometry::Config gps_odometry;
+  lio_mapper::Config lio_mapper;
+  fusion_gate::Config fusion_gate;
+};
+
+/// What one input made the three components say, in the order in which they said it.
+struct Step {
+  std::vector<Odometry> gps_odometry;
+  std::vector<GpsStatus> gps_status;
+  std::vector<lio_mapper::ScanResult> scans;
+  std::vector<Odometry> lio_imu_rate;
+  std::vector<Odometry> fused;
+  std::vector<FusionStatus> fusion_status;
+  std::vector<StateUpdate> state_updates;
+  std::optional<Datum> datum;  ///< elected by this input
+  Events events;
+};
+
+/// Deterministic: the same entries give the same bits. The wiring is that of the bus: the gate
+/// hears the filter and the mapper, the mapper hears the gate.
+class Lockstep {
+ public:
+  /// Throws ConfigError when a core refuses its configuration.
+  explicit Lockstep(const CoreConfigs& configs);
+  ~Lockstep();
+
+  /// Withheld fixes are not fed to anybody.
+  Step step(const recording::LogEntry& entry);
+  /// End of the log: what still waits in the mapper.
+  Step finish();
+
+  std::optional<Datum> datum() const;
+  std::optional<Alignment> best_alignment() const;
+  LioStatus lio_status() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace trigpoint::pipeline

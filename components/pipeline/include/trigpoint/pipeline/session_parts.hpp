@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// The part of the session folder that each program writes. The offline run holds all of them; on
+// the bus each process holds its own, so that nothing needs a shared disk. All throw
+// std::runtime_error naming file and cause when the disk refuses; what was written before stays
+// valid.
+#pragma once
+
+#include "trigpoint/base/messages.hpp"
+#include "trigpoint/export/session.hpp"
+#include "trigpoint/lio_mapper/keyframe_store.hpp"
+#include "trigpoint/lio_mapper/lio_mapper.hpp"
+#include "trigpoint/recording/log.hpp"
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace trigpoint::pipeline {
+
+/// gps.tum, gps_status.csv, datum.yaml and the filter's counts.
+class GpsPart {
+ public:
+  explicit GpsPart(const std::string& session);
+  void on_odometry(const Odometry& odometry);
+  void on_status(const GpsStatus& status);
+  void on_datum(const Datum& datum);
+  void close();
+
+ private:
+  std::string session_;
+  exporter::TrajectoryWriter trajectory_;
+  exporter::GpsStatusLog statuses_;
+  exporter::CountsWriter counts_;
+  GpsStatus last_;
+};
+
+/// lio.tum, scans.csv, keyframes.sqlite and the mapper's counts.
+class MapperPart {
+ public:
+  explicit MapperPart(const std::string& session);
+  void on_scan(const lio_mapper::ScanResult& scan);
+  void close(const LioStatus& status);
+
+ private:
+  exporter::TrajectoryWriter trajectory_;
+  exporter::ScanLog scans_;
+  lio_mapper::KeyframeWriter keyframes_;
+  exporter::CountsWriter counts_;
+};
+
+/// fused.tum, gate.csv, alignment.yaml and the gate's counts.
+class GatePart {
+ public:
+  explicit GatePart(const std::string& session);
+  void on_fused(const Odometry& odometry);
+  void on_status(const FusionStatus& status);
+  /// The best alignment so far; cheap enough for once a second of data time.
+  void on_alignment(const Alignment& alignment, bool admitted);
+  void close();
+
+ private:
+  std::string session_;
+  exporter::TrajectoryWriter trajectory_;
+  exporter::GateLog gate_log_;
+  exporter::CountsWriter counts_;
+  FusionStatus last_;
+};
+
+/// fixes.csv and the counts of what the log held and of what was handed on.
+class LogPart {
+ public:
+  explicit LogPart(const std::string& session);
+  void on_entry(const recording::LogEntry& entry);
+  void close();
+
+  Nanoseconds first_ns() const { return first_ns_; }
+
+  Nanoseconds last_ns() const { return last_ns_; }
+
+  std::uint64_t sweeps() const { return sweeps_; }
+
+ private:
+  exporter::FixLog fixes_;
+  exporter::CountsWriter counts_;
+  Nanoseconds first_ns_{0};
+  Nanoseconds last_ns_{0};
+  std::uint64_t sweeps_{0};
+  std::uint64_t imu_{0};
+  std::uint64_t fixes_fed_{0};
+  std::uint64_t fixes_withheld_{0};
+};
+
+}  // namespace trigpoint::pipeline

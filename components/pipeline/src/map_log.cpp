@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "trigpoint/pipeline/map_log.hpp"
+
+#include "trigpoint/export/session.hpp"
+#include "trigpoint/pipeline/session_parts.hpp"
+
+#include <chrono>
+#include <optional>
+
+namespace trigpoint::pipeline {
+
+namespace {
+
+namespace file = exporter::session_file;
+using Clock = std::chrono::steady_clock;
+
+double milliseconds_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+/// Everything that an offline run writes.
+class Session {
+ public:
+  explicit Session(const std::string& folder)
+      : folder_(folder), gps_(folder), mapper_(folder), gate_(folder), log_(folder) {}
+
+  void on_entry(const recording::LogEntry& entry) { log_.on_entry(entry); }
+
+  void on_step(Step& step, double step_ms) {
+    if (step.datum) {
+      gps_.on_datum(*step.datum);
+    }
+    for (const Odometry& odometry : step.gps_odometry) {
+      gps_.on_odometry(odometry);
+    }
+    for (const GpsStatus& status : step.gps_status) {
+      gps_.on_status(status);
+    }
+    for (lio_mapper::ScanResult& scan : step.scans) {
+      scan.status.scan_ms = step_ms / static_cast<double>(step.scans.size());
+      mapper_.on_scan(scan);
+    }
+    for (const Odometry& fused : step.fused) {
+      gate_.on_fused(fused);
+    }
+    for (const FusionStatus& status : step.fusion_status) {
+      gate_.on_status(status);
+    }
+  }
+
+  void close(const Lockstep& cores) {
+    if (const auto datum = cores.datum()) {
+      gps_.on_datum(*datum);
+    }
+    if (const auto alignment = cores.best_alignment()) {
+      gate_.on_alignment(*alignment, cores.lio_status().aligned);
+    }
+    gps_.close();
+    mapper_.close(cores.lio_status());
+    gate_.close();
+    log_.close();
+  }
+
+  const LogPart& log() const { return log_; }
+
+  std::string path(const char* name) const { return exporter::path_in(folder_, name); }
+
+ private:
+  std::string folder_;
+  GpsPart gps_;
+  MapperPart mapper_;
+  GatePart gate_;
+  LogPart log_;
+};
+
+/// The next entry, or nothing at the end or where the log breaks off (then `error` says why).
+std::optional<recording::LogEntry> next_entry(recording::LogReader& log, std::string& error) {
+  try {
+    return log.next();
+  } catch (const recording::LogError& broken) {
+    error = broken.what();
+    return std::nullopt;
+  }
+}
+
+void tell(const Step& step, const MapLogOptions& options) {
+  if (options.on_event) {
+    for (const Event& event : step.events) {
+      options.on_event(event);
+    }
+  }
+}
+
+}  // namespace
+
+MapLogResult map_log(recording::LogReader& log,
+                     const CoreConfigs& configs,
+                     const MapLogOptions& options) {
+  Lockstep cores(configs);
+  exporter::create_session_folder(options.session);
+  Session session(options.session);
+  exporter::write_text(session.path(file::kConfig), options.config_text);
+  const Clock::time_point start = Clock::now();
+  MapLogResult result;
+
+  const auto run = [&](auto&& advance) {
+    const Clock::time_point before = Clock::now();
+    Step step = advance();
+    session.on_step(step, milliseconds_since(before));
+    tell(step, options);
+  };
+  while (const auto entry = next_entry(log, result.log_error)) {
+    session.on_entry(*entry);
+    run([&] { return cores.step(*entry); });
+    if (options.progress) {
+      options.progress(log.progress());
+    }
+    if (options.stop && options.stop()) {
+      result.stopped = true;
+      break;
+    }
+  }
+  run([&] { return cores.finish(); });
+  session.close(cores);
+
+  result.sweeps_in_log = session.log().sweeps();
+  result.sweeps_used = cores.lio_status().scans_used;
+  result.data_s = to_seconds(session.log().last_ns() - session.log().first_ns());
+  result.wall_s = milliseconds_since(start) * 1e-3;
+  exporter::write_run(
+      session.path(file::kRun),
+      {log.summary().path, "offline", options.mode, "ekf15", result.data_s, result.wall_s});
+  if (const auto truth = log.truth_file()) {
+    exporter::copy_file(*truth, session.path(file::kTruth));
+  }
+  return result;
+}
+
+}  // namespace trigpoint::pipeline

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "player.hpp"
+
+#include "trigpoint/bus/bus.hpp"
+#include "trigpoint/bus/convert.hpp"
+#include "trigpoint/bus/topics.hpp"
+
+#include "pace.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <thread>
+#include <variant>
+
+namespace trigpoint::recording {
+
+namespace {
+
+namespace topics = bus::topics;
+using WallClock = std::chrono::steady_clock;
+using namespace std::chrono_literals;
+
+constexpr Nanoseconds kClockPeriod_ns = 10'000'000;
+/// A reader's history holds a thousand samples: ask well before that whether all have come.
+constexpr std::uint64_t kImuBurst = 200;
+
+class Player {
+ public:
+  explicit Player(const PlayOptions& options)
+      : options_(options),
+        participant_(options.bus, "player", options.on_event),
+        points_(participant_, topics::points.renamed(options.robot.points_topic)),
+        imu_(participant_, topics::imu.renamed(options.robot.imu_topic)),
+        fixes_(participant_, topics::fix.renamed(options.robot.fix_topic)),
+        clock_(participant_, topics::clock),
+        lio_status_(participant_,
+                    topics::lio_status,
+                    [this](const trigpoint_msgs::msg::LioStatus& m, const bus::MessageInfo&) {
+                      pace_.on_lio_status(bus::from_message(m));
+                    }),
+        gps_status_(participant_,
+                    topics::gps_status,
+                    [this](const trigpoint_msgs::msg::GpsStatus& m, const bus::MessageInfo&) {
+                      pace_.on_gps_status(bus::from_message(m));
+                    }),
+        fusion_status_(participant_,
+                       topics::fusion_status,
+                       [this](const trigpoint_msgs::msg::FusionStatus& m, const bus::MessageInfo&) {
+                         pace_.on_fusion_status(bus::from_message(m));
+                       }) {}
+
+  /// The mapper, the filter and the gate must listen and be heard before the first message.
+  void wait_for_peers() {
+    const auto deadline = WallClock::now() + options_.wait_for_peers;
+    const auto complete = [this] {
+      return points_.matched() > 0 && imu_.matched() > 1 && fixes_.matched() > 1 &&
+             lio_status_.matched() > 0 && gps_status_.matched() > 0 && fusion_status_.matched() > 0;
+    };
+    while (!complete() && WallClock::now() < deadline && !stop_requested()) {
+      std::this_thread::sleep_for(20ms);
+    }
+    if (!complete()) {
+      tell("peers_missing",
+           "after " + std::to_string(options_.wait_for_peers.count()) + " s: points has " +
+               std::to_string(points_.matched()) + " readers (1 expected), imu " +
+               std::to_string(imu_.matched()) + " (2), gps/fix " +
+               std::to_string(fixes_.matched()) + " (2); playing all the same");
+    }
+    pace_.begin();
+  }
+
+  void publish(const LogEntry& entry) {
+    if (first_ns_ == 0) {
+      first_ns_ = entry.receive_ns;
+      started_ = WallClock::now();
+    }
+    wait_for_time(entry.receive_ns);
+    publish_clock(entry.receive_ns);
+    if (!entry.withheld) {
+      std::visit([this](const auto& measurement) { send(measurement); }, entry.measurement);
+    }
+  }
+
+  /// Everything that was published has been taken in.
+  void drain() {
+    points_.wait_for_acknowledgments(options_.patience);
+    imu_.wait_for_acknowledgments(options_.patience);
+    fixes_.wait_for_acknowledgments(options_.patience);
+    await("the last sweep", lio_status_.matched(), [this] {
+      return pace_.wait_for_sweeps(result.sweeps > 0 ? result.sweeps - 1 : 0, options_.patience);
+    });
+    await("the last IMU sample", lio_status_.matched(), [this] {
+      return pace_.wait_for_imu(result.imu, options_.patience);
+    });
+  }
+
+  bool stop_requested() const { return options_.stop && options_.stop(); }
+
+  PlayResult result;
+
+ private:
+  void send(const PointCloudMessage& cloud) {
+    if (options_.rate == 0.0) {
+      await("a sweep", lio_status_.matched(), [this] {
+        return pace_.wait_for_sweeps(result.sweeps, options_.patience);
+      });
+    }
+    points_.publish(bus::to_message(cloud));
+    if (options_.rate == 0.0) {
+      points_.wait_for_acknowledgments(options_.patience);
+    }
+    ++result.sweeps;
+  }
+
+  void send(const ImuSample& sample) {
+    imu_.publish(bus::to_message(sample));
+    if (++result.imu % kImuBurst == 0) {
+      imu_.wait_for_acknowledgments(options_.patience);
+    }
+  }
+
+  void send(const GnssFix& fix) {
+    if (options_.rate == 0.0) {
+      imu_.wait_for_acknowledgments(options_.patience);
+    }
+    fixes_.publish(bus::to_message(fix));
+    ++result.fixes;
+    if (options_.rate == 0.0) {
+      await("a fix", gps_status_.matched(), [this] {
+        return pace_.wait_for_fixes(result.fixes, options_.patience);
+      });
+      await("a verdict", fusion_status_.matched(), [&] {
+        return pace_.wait_for_verdict(fix.stamp_ns, options_.patience);
+      });
+    }
+  }
+
+  /// Waits for an answer if anybody is there to give it; one that never came is not waited for
+  /// again at full length.
+  template <typename Wait>
+  void await(const char* what, int peers, Wait wait) {
+    if (peers == 0 || stop_requested() || wait()) {
+      return;
+    }
+    ++result.unanswered;
+    tell("unanswered",
+         std::string("no answer to ") + what + " within " +
+             std::to_string(options_.patience.count()) + " ms; going on");
+  }
+
+  void wait_for_time(Nanoseconds receive_ns) const {
+    if (options_.rate <= 0.0) {
+      return;
+    }
+    const auto due = started_ + std::chrono::nanoseconds(static_cast<Nanoseconds>(
+                                    static_cast<double>(receive_ns - first_ns_) / options_.rate));
+    while (WallClock::now() < due && !stop_requested()) {
+      std::this_thread::sleep_until(std::min(due, WallClock::now() + WallClock::duration(100ms)));
+    }
+  }
+
+  void publish_clock(Nanoseconds now_ns) {
+    if (now_ns - clock_ns_ >= kClockPeriod_ns) {
+      clock_ns_ = now_ns;
+      clock_.publish(bus::to_clock_message(now_ns));
+    }
+  }
+
+  void tell(const std::string& code, const std::string& text) const {
+    if (options_.on_event) {
+      options_.on_event({Severity::kWarning, clock_ns_, code, text});
+    }
+  }
+
+  const PlayOptions& options_;
+  Pace pace_;
+  Nanoseconds first_ns_{0};
+  Nanoseconds clock_ns_{0};
+  WallClock::time_point started_;
+  bus::Participant participant_;
+  bus::Publisher<sensor_msgs::msg::PointCloud2> points_;
+  bus::Publisher<sensor_msgs::msg::Imu> imu_;
+  bus::Publisher<sensor_msgs::msg::NavSatFix> fixes_;
+  bus::Publisher<rosgraph_msgs::msg::Clock> clock_;
+  bus::Subscription<trigpoint_msgs::msg::LioStatus> lio_status_;
+  bus::Subscription<trigpoint_msgs::msg::GpsStatus> gps_status_;
+  bus::Subscription<trigpoint_msgs::msg::FusionStatus> fusion_status_;
+};
+
+}  // namespace
+
+PlayResult play(LogReader& log, const PlayOptions& options) {
+  Player player(options);
+  player.wait_for_peers();
+  try {
+    while (!player.stop_requested()) {
+      const std::optional<LogEntry> entry = log.next();
+      if (!entry) {
+        break;
+      }
+      if (options.on_entry) {
+        options.on_entry(*entry);
+      }
+      player.publish(*entry);
+      if (options.progress) {
+        options.progress(log.progress());
+      }
+    }
+  } catch (const LogError& broken) {
+    player.result.log_error = broken.what();
+  }
+  player.result.stopped = player.stop_requested();
+  if (!player.result.stopped) {
+    player.drain();
+  }
+  return player.result;
+}
+
+}  // namespace trigpoint::recording
