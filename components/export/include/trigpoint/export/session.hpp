@@ -66,11 +66,13 @@ class TrajectoryWriter {
                    const std::string& frame_comment,
                    Opening opening = Opening::kFresh);
   ~TrajectoryWriter();
-  /// False, and nothing written, when the pose is not finite.
+  /// False, and nothing written, when the pose is not finite or the stamp is not later than the one
+  /// before: a trajectory is one pose a moment, in order.
   bool append(Nanoseconds stamp_ns, const Pose& T_frame_base);
 
  private:
   std::unique_ptr<LineFile> lines_;
+  Nanoseconds last_stamp_ns_;
 };
 
 struct StampedPose {

@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// The small YAML files of a session: written by hand (few keys, fixed order), read strictly.
+#include "trigpoint/export/session.hpp"
+
+#include "csv.hpp"
+#include "line_file.hpp"
+#include <unistd.h>
+#include <yaml-cpp/yaml.h>
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+
+namespace trigpoint::exporter {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Order of the alignment's covariance.
+constexpr std::array<const char*, 4> kAlignmentAxes{"yaw", "x", "y", "z"};
+
+std::string quoted(const std::string& text) {
+  YAML::Emitter out;
+  out << YAML::DoubleQuoted << text;
+  return out.c_str();
+}
+
+/// A mapping whose keys are asked for one by one; errors name file, line and key.
+class Record {
+ public:
+  explicit Record(const std::string& file) : file_(file) {
+    std::ifstream in(file);
+    if (!in) {
+      throw_errno(file, "open for reading");
+    }
+    try {
+      node_ = YAML::Load(in);
+    } catch (const YAML::Exception& error) {
+      throw std::runtime_error(file + ": not valid YAML: " + error.what());
+    }
+    if (!node_.IsMap() && !node_.IsNull()) {
+      throw std::runtime_error(file + ": expected `key: value` lines");
+    }
+  }
+
+  template <typename Value>
+  Value get(const std::string& key) const {
+    return convert<Value>(key, node_[key]);
+  }
+
+  template <typename Value>
+  std::vector<Value> get_list(const std::string& key, std::size_t size) const {
+    const YAML::Node node = node_[key];
+    if (!node || !node.IsSequence() || node.size() != size) {
+      throw std::runtime_error(file_ + ": " + key + " must be a list of " + std::to_string(size));
+    }
+    std::vector<Value> values;
+    for (const auto& item : node) {
+      values.push_back(convert<Value>(key, item));
+    }
+    return values;
+  }
+
+  const YAML::Node& node() const { return node_; }
+
+  template <typename Value>
+  Value convert(const std::string& key, const YAML::Node& node) const {
+    if (!node) {
+      throw std::runtime_error(file_ + ": the key " + key + " is missing");
+    }
+    try {
+      return node.as<Value>();
+    } catch (const YAML::Exception&) {
+      throw std::runtime_error(file_ + ":" + std::to_string(node.Mark().line + 1) + ": " + key +
+                               " has a value of the wrong type");
+    }
+  }
+
+ private:
+  std::string file_;
+  YAML::Node node_;
+};
+
+std::string covariance_text(const Eigen::Matrix4d& covariance) {
+  std::string text = "[";
+  for (int i = 0; i < 16; ++i) {
+    text += (i == 0 ? "" : ", ") + number_text(covariance(i / 4, i % 4));
+  }
+  return text + "]";
+}
+
+}  // namespace
+
+std::string path_in(const std::string& folder, const std::string& name) {
+  return (fs::path(folder) / name).string();
+}
+
+void create_session_folder(const std::string& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error || !fs::is_directory(folder)) {
+    throw std::runtime_error(folder + ": cannot create the session folder: " +
+                             (error ? error.message() : "it is a file"));
+  }
+}
+
+void write_text(const std::string& file, const std::string& text) {
+  const std::string beside = file + ".part" + std::to_string(::getpid());
+  try {
+    LineFile(beside, text, Opening::kFresh);
+  } catch (const std::runtime_error&) {
+    ::unlink(beside.c_str());
+    throw;
+  }
+  if (std::rename(beside.c_str(), file.c_str()) != 0) {
+    throw_errno(file, "replace");
+  }
+}
+
+void copy_file(const std::string& from, const std::string& to) {
+  std::error_code error;
+  fs::copy_file(from, to, fs::copy_options::overwrite_existing, error);
+  if (error) {
+    throw std::runtime_error(to + ": cannot copy from " + from + ": " + error.message());
+  }
+}
+
+void write_datum(const std::string& file, const Datum& datum) {
+  write_text(file,
+             "# Origin of the frame map: WGS 84, height above the ellipsoid\nlatitude_deg: " +
+                 number_text(datum.latitude_deg) + "\nlongitude_deg: " +
+                 number_text(datum.longitude_deg) + "\nheight_m: " + number_text(datum.height_m) +
+                 "\nelected_ns: " + std::to_string(datum.elected_ns) +
+                 "\nid: " + quoted(datum.id()) + "\n");
+}
+
+Datum read_datum(const std::string& file) {
+  const Record record(file);
+  Datum datum;
+  datum.latitude_deg = record.get<double>("latitude_deg");
+  datum.longitude_deg = record.get<double>("longitude_deg");
+  datum.height_m = record.get<double>("height_m");
+  datum.elected_ns = record.get<Nanoseconds>("elected_ns");
+  const bool sane = std::abs(datum.latitude_deg) <= 90.0 &&
+                    std::abs(datum.longitude_deg) <= 180.0 && std::isfinite(datum.height_m);
+  if (!sane) {
+    throw std::runtime_error(file + ": not a place on the Earth: " + datum.id());
+  }
+  return datum;
+}
+
+void write_alignment(const std::string& file, const AlignmentRecord& record) {
+  const auto& [epoch, T_map_odom, covariance] = record.alignment;
+  std::string text = "# Best known T_map_odom: p_map = Rz(yaw_rad) * p_odom + translation_m\n";
+  text += "odom_epoch: " + std::to_string(epoch);
+  text += "\nyaw_rad: " + number_text(T_map_odom.yaw_rad);
+  text += "\ntranslation_m: [" + number_text(T_map_odom.p.x()) + ", " +
+          number_text(T_map_odom.p.y()) + ", " + number_text(T_map_odom.p.z()) + "]";
+  for (int i = 0; i < 4; ++i) {
+    text += std::string("\n") + kAlignmentAxes[static_cast<std::size_t>(i)] +
+            (i == 0 ? "_sigma_rad: " : "_sigma_m: ") + number_text(std::sqrt(covariance(i, i)));
+  }
+  text += "\n# rows of yaw, x, y, z\ncovariance: " + covariance_text(covariance);
+  text += std::string("\nadmitted: ") + (record.admitted ? "true" : "false");
+  text += "\ncomment: " + quoted(record.comment) + "\n";
+  write_text(file, text);
+}
+
+AlignmentRecord read_alignment(const std::string& file) {
+  const Record record(file);
+  AlignmentRecord result;
+  result.alignment.odom_epoch = record.get<std::uint32_t>("odom_epoch");
+  result.alignment.T_map_odom.yaw_rad = record.get<double>("yaw_rad");
+  const auto p = record.get_list<double>("translation_m", 3);
+  result.alignment.T_map_odom.p = {p[0], p[1], p[2]};
+  const auto covariance = record.get_list<double>("covariance", 16);
+  for (int i = 0; i < 16; ++i) {
+    result.alignment.covariance(i / 4, i % 4) = covariance[static_cast<std::size_t>(i)];
+  }
+  result.admitted = record.get<bool>("admitted");
+  result.comment = record.get<std::string>("comment");
+  return result;
+}
+
+void write_run(const std::string& file, const RunInfo& run) {
+  write_text(file,
+             "log: " + quoted(run.log) + "\nhow: " + quoted(run.how) +
+                 "\nmode: " + quoted(run.mode) + "\ngps_filter: " + quoted(run.gps_filter) +
+                 "\ndata_s: " + number_text(run.data_s) + "\nwall_s: " + number_text(run.wall_s) +
+                 "\n");
+}
+
+RunInfo read_run(const std::string& file) {
+  const Record record(file);
+  RunInfo run;
+  run.log = record.get<std::string>("log");
+  run.how = record.get<std::string>("how");
+  run.mode = record.get<std::string>("mode");
+  run.gps_filter = record.get<std::string>("gps_filter");
+  run.data_s = record.get<double>("data_s");
+  run.wall_s = record.get<double>("wall_s");
+  return run;
+}
+
+CountsWriter::CountsWriter(const std::string& folder, const std::string& program)
+    : file_(path_in(folder, program + session_file::kCountsSuffix)) {}
+
+void CountsWriter::write(const std::vector<NamedCount>& counts) const {
+  std::string text = "# messages: stream.what[.reason]\n";
+  for (const auto& [name, count] : counts) {
+    text += quoted(name) + ": " + std::to_string(count) + "\n";
+  }
+  write_text(file_, text);
+}
+
+std::vector<NamedCount> read_counts(const std::string& file) {
+  const Record record(file);
+  std::vector<NamedCount> counts;
+  for (const auto& item : record.node()) {
+    const auto name = item.first.as<std::string>();
+    counts.push_back({name, record.convert<std::uint64_t>(name, item.second)});
+  }
+  return counts;
+}
+
+std::vector<NamedCount> counts_of(const GpsStatus& status) {
+  std::vector<NamedCount> counts{{"imu.received", status.imu_received},
+                                 {"fix.received", status.fixes_received},
+                                 {"fix.used", status.fixes_accepted}};
+  for (const auto& [reason, count] : status.rejections) {
+    counts.push_back({"fix.refused." + reason, count});
+  }
+  return counts;
+}
+
+std::vector<NamedCount> counts_of(const LioStatus& status) {
+  std::vector<NamedCount> counts{{"imu.received", status.imu_received},
+                                 {"points.received", status.scans_received},
+                                 {"points.used", status.scans_used}};
+  for (const auto& [reason, count] : status.scans_refused) {
+    counts.push_back({"points.refused." + reason, count});
+  }
+  return counts;
+}
+
+std::vector<NamedCount> counts_of(const FusionStatus& status) {
+  std::vector<NamedCount> counts{{"fix.received", status.fixes_seen},
+                                 {"fix.used", status.fixes_used}};
+  for (const auto& [reason, count] : status.verdicts) {
+    counts.push_back({"fix.refused." + reason, count});
+  }
+  return counts;
+}
+
+}  // namespace trigpoint::exporter
