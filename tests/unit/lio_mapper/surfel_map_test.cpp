@@ -1,0 +1,579 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "local_map.hpp"
+#include <Eigen/Eigenvalues>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <random>
+#include <thread>
+#include <tuple>
+
+namespace trigpoint::lio_mapper {
+namespace {
+
+constexpr double kLeaf_m = 0.5;
+constexpr double kParent_m = 1.5;
+constexpr double kNoise_m = 0.02;  // a spinning LiDAR's range noise
+
+PointXyzi point_of(const Eigen::Vector3d& p) {
+  return {static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()), 1.0F};
+}
+
+/// A square patch of a plane through `origin`, spanned by `u` and `v` (unit vectors), with noise
+/// across it.
+PointCloud patch(const Eigen::Vector3d& origin,
+                 const Eigen::Vector3d& u,
+                 const Eigen::Vector3d& v,
+                 double side_m,
+                 int points,
+                 double noise_m,
+                 unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> along(0.0, side_m);
+  std::normal_distribution<double> across(0.0, 1.0);
+  const Eigen::Vector3d normal = u.cross(v);
+  PointCloud cloud;
+  for (int i = 0; i < points; ++i) {
+    const double a = along(random);
+    const double b = along(random);
+    cloud.push_back(point_of(origin + a * u + b * v + noise_m * across(random) * normal));
+  }
+  return cloud;
+}
+
+PointCloud ground(double z_m, unsigned seed, double noise_m = kNoise_m) {
+  return patch({-10.0, -10.0, z_m},
+               Eigen::Vector3d::UnitX(),
+               Eigen::Vector3d::UnitY(),
+               20.0,
+               40000,
+               noise_m,
+               seed);
+}
+
+double height_at(const PlaneMatch& plane, double x, double y) {
+  return -(plane.offset_m + plane.normal.x() * x + plane.normal.y() * y) / plane.normal.z();
+}
+
+bool same_bits(const PlaneMatch& a, const PlaneMatch& b) {
+  return a.normal == b.normal && a.offset_m == b.offset_m && a.thickness2_m2 == b.thickness2_m2;
+}
+
+std::vector<Eigen::Vector3d> random_points(int count, double half_side_m, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> coordinate(-half_side_m, half_side_m);
+  std::vector<Eigen::Vector3d> points;
+  for (int i = 0; i < count; ++i) {
+    const double x = coordinate(random);
+    const double y = coordinate(random);
+    const double z = coordinate(random);
+    points.emplace_back(x, y, z);
+  }
+  return points;
+}
+
+/// The same point moved out of the bands near the faces of leaves, where a point may be given to
+/// the leaf behind the face: for tests that compute leaves by themselves.
+Eigen::Vector3d away_from_faces(const Eigen::Vector3d& p) {
+  constexpr double kBand = 0.101;
+  const auto moved = [](double v) {
+    const double cell = std::floor(v / kLeaf_m);
+    return kLeaf_m * (cell + kBand + (1.0 - 2.0 * kBand) * (v / kLeaf_m - cell));
+  };
+  return {moved(p.x()), moved(p.y()), moved(p.z())};
+}
+
+struct HeightErrors {
+  double mean{0.0};
+  double rms{0.0};
+  int matched{0};
+};
+
+/// Errors of the matched planes' heights over the middle of ground(z_m), asked from `above_m`.
+HeightErrors height_errors(const LocalMap& map, double z_m, double above_m) {
+  HeightErrors errors;
+  for (const Eigen::Vector3d& p : random_points(2000, 8.0, 5)) {
+    PlaneMatch plane;
+    if (map.match({p.x(), p.y(), z_m + above_m}, plane)) {
+      const double error = height_at(plane, p.x(), p.y()) - z_m;
+      errors.mean += error;
+      errors.rms += error * error;
+      ++errors.matched;
+    }
+  }
+  errors.mean /= errors.matched;
+  errors.rms = std::sqrt(errors.rms / errors.matched);
+  return errors;
+}
+
+TEST(SurfelMap, is_empty_before_the_first_point_and_matches_nothing) {
+  const auto map = make_surfel_map({});
+  PlaneMatch plane;
+  EXPECT_TRUE(map->empty());
+  EXPECT_FALSE(map->match({0.0, 0.0, 0.0}, plane));
+}
+
+// Leaf means of about 25 points with 20 mm noise scatter by 4 mm, planes of 25 leaves by 1 mm.
+constexpr double kPlaneMean_m = 0.001;
+constexpr double kPlaneRms_m = 0.003;
+
+TEST(SurfelMap, recovers_level_ground_to_millimetres_at_any_height) {
+  // 0.0 and 1.5 run along the faces of parents, 0.5 along those of leaves, the others between.
+  for (const double z_m : {0.0, 0.02, 0.25, 0.5, 0.75, 1.48, 1.5, 1.52, -1.5}) {
+    const auto map = make_surfel_map({});
+    map->insert(ground(z_m, 3));
+    const HeightErrors errors = height_errors(*map, z_m, 0.0);
+    EXPECT_EQ(errors.matched, 2000) << z_m;
+    EXPECT_NEAR(errors.mean, 0.0, kPlaneMean_m) << z_m;
+    EXPECT_LT(errors.rms, kPlaneRms_m) << z_m;
+  }
+}
+
+TEST(SurfelMap, finds_the_ground_also_from_behind_a_face) {
+  // A pose that is off by decimetres puts points into a parent that holds nothing at all.
+  for (const double above_m : {-0.3, -0.1, 0.1, 0.3}) {
+    const auto map = make_surfel_map({});
+    map->insert(ground(1.5, 4));
+    const HeightErrors errors = height_errors(*map, 1.5, above_m);
+    EXPECT_EQ(errors.matched, 2000) << above_m;
+    EXPECT_NEAR(errors.mean, 0.0, kPlaneMean_m) << above_m;
+    EXPECT_LT(errors.rms, kPlaneRms_m) << above_m;
+  }
+}
+
+TEST(SurfelMap, recovers_an_inclined_plane) {
+  const Eigen::Vector3d u = Eigen::Vector3d(1.0, 0.2, 0.3).normalized();
+  const Eigen::Vector3d v = u.cross(Eigen::Vector3d(0.1, -0.4, 0.9)).normalized();
+  const Eigen::Vector3d normal = u.cross(v);
+  const Eigen::Vector3d origin(100.3, -250.7, 12.9);
+  const auto map = make_surfel_map({});
+  map->insert(patch(origin, u, v, 16.0, 30000, kNoise_m, 6));
+  constexpr double kNormal_rad = 0.01;
+  double squares = 0.0;
+  int matched = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const Eigen::Vector3d p = origin + (2.0 + 0.012 * i) * u + (2.0 + 0.37 * (i % 33)) * v;
+    PlaneMatch plane;
+    if (map->match(p, plane)) {
+      ++matched;
+      squares += std::pow(plane.normal.dot(p) + plane.offset_m, 2);
+      EXPECT_GT(std::abs(plane.normal.dot(normal)), std::cos(kNormal_rad));
+      EXPECT_NEAR(plane.normal.norm(), 1.0, 1e-12);
+    }
+  }
+  EXPECT_GT(matched, 990);
+  EXPECT_LT(std::sqrt(squares / matched), kPlaneRms_m);
+}
+
+TEST(SurfelMap, thickness_is_the_variance_of_the_leaf_means) {
+  // One point per leaf, so that means are points: then the variance is that of the noise.
+  constexpr double kThick_m = 0.05;
+  std::mt19937 random(8);
+  std::normal_distribution<double> across(0.0, kThick_m);
+  PointCloud cloud;
+  for (double x = -19.75; x < 20.0; x += kLeaf_m) {
+    for (double y = -19.75; y < 20.0; y += kLeaf_m) {
+      cloud.push_back(point_of({x, y, 0.75 + across(random)}));
+    }
+  }
+  const auto map = make_surfel_map({});
+  map->insert(cloud);
+  double sum = 0.0;
+  int matched = 0;
+  for (double x = -16.0; x < 16.0; x += kParent_m) {
+    for (double y = -16.0; y < 16.0; y += kParent_m) {
+      PlaneMatch plane;
+      ASSERT_TRUE(map->match({x, y, 0.75}, plane));
+      sum += plane.thickness2_m2;
+      ++matched;
+    }
+  }
+  // 25 leaves less 3 parameters: 22/25 of the variance; 500 planes know it to a few per cent.
+  constexpr double kRelative = 0.1;
+  const double expected = kThick_m * kThick_m * 22.0 / 25.0;
+  EXPECT_NEAR(sum / matched, expected, kRelative * expected);
+}
+
+TEST(SurfelMap, a_perfect_plane_still_has_some_thickness) {
+  const auto map = make_surfel_map({});
+  map->insert(ground(0.75, 9, 0.0));
+  PlaneMatch plane;
+  ASSERT_TRUE(map->match({0.1, 0.1, 0.75}, plane));
+  EXPECT_GT(plane.thickness2_m2, 1e-6);
+}
+
+/// Two walls that meet at x = y = 0.2, and the ground below: a street corner seen from outside.
+PointCloud corner(unsigned seed) {
+  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
+  PointCloud cloud =
+      patch({0.2, 0.2, 0.0}, Eigen::Vector3d::UnitY(), z, 9.0, 12000, kNoise_m, seed);
+  const PointCloud second =
+      patch({0.2, 0.2, 0.0}, Eigen::Vector3d::UnitX(), z, 9.0, 12000, kNoise_m, seed + 1);
+  cloud.insert(cloud.end(), second.begin(), second.end());
+  return cloud;
+}
+
+TEST(SurfelMap, gives_points_beside_a_corner_the_wall_they_lie_on) {
+  const auto map = make_surfel_map({});
+  map->insert(corner(10));
+  constexpr double kRight_m = 0.05;
+  int matched = 0;
+  int right = 0;
+  for (double along = 0.1; along < 6.0; along += 0.05) {
+    for (double z = 0.6; z < 8.0; z += 0.31) {
+      for (const Eigen::Vector3d& p :
+           {Eigen::Vector3d(0.2, 0.2 + along, z), Eigen::Vector3d(0.2 + along, 0.2, z)}) {
+        PlaneMatch plane;
+        if (map->match(p, plane)) {
+          ++matched;
+          right += std::abs(plane.normal.dot(p) + plane.offset_m) < kRight_m ? 1 : 0;
+        }
+      }
+    }
+  }
+  const int asked = 2 * 118 * 24;
+  // The parent that holds the edge itself has no plane: what its neighbours do not reach is left
+  // out.
+  EXPECT_GT(matched, 0.85 * asked);
+  EXPECT_GT(right, 0.99 * matched);
+}
+
+TEST(SurfelMap, sees_no_plane_in_a_pole) {
+  PointCloud pole;
+  for (int i = 0; i < 2000; ++i) {
+    pole.push_back(point_of({0.7 + 0.05 * std::cos(i), 0.7 + 0.05 * std::sin(i), 0.004 * i}));
+  }
+  const auto map = make_surfel_map({});
+  map->insert(pole);
+  PlaneMatch plane;
+  for (double z = 0.0; z < 8.0; z += 0.1) {
+    EXPECT_FALSE(map->match({0.7, 0.7, z}, plane)) << z;
+  }
+}
+
+TEST(SurfelMap, sees_no_plane_in_a_filled_volume) {
+  PointCloud blob;
+  for (const Eigen::Vector3d& p : random_points(40000, 3.0, 11)) {
+    blob.push_back(point_of(p));
+  }
+  const auto map = make_surfel_map({});
+  map->insert(blob);
+  int matched = 0;
+  for (const Eigen::Vector3d& p : random_points(1000, 2.0, 12)) {
+    PlaneMatch plane;
+    matched += map->match(p, plane) ? 1 : 0;
+  }
+  EXPECT_EQ(matched, 0);
+}
+
+TEST(SurfelMap, gives_no_plane_that_is_farther_than_the_limit) {
+  const auto map = make_surfel_map({});
+  map->insert(ground(0.75, 13));
+  PlaneMatch plane;
+  EXPECT_TRUE(map->match({0.3, 0.3, 0.75 + 0.45}, plane));
+  EXPECT_FALSE(map->match({0.3, 0.3, 0.75 + 0.55}, plane));
+}
+
+TEST(SurfelMap, ignores_what_is_not_finite_or_absurdly_far) {
+  const auto map = make_surfel_map({});
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  map->insert({{nan, 0, 0, 0}, {0, INFINITY, 0, 0}, {0, 0, 1e12F, 0}, {1, 1, 1, nan}});
+  EXPECT_EQ(map->size(), 1U);
+  EXPECT_EQ(map->points()[0].intensity, 0.0F);
+  PlaneMatch plane;
+  EXPECT_FALSE(map->match({kNaN, 0.0, 0.0}, plane));
+  EXPECT_FALSE(map->match({0.0, 1e300, 0.0}, plane));
+}
+
+TEST(SurfelMap, freezes_a_leaf_at_its_capacity) {
+  SurfelMapConfig config;
+  config.leaf_capacity = 4;
+  const auto map = make_surfel_map(config);
+  const PointXyzi low{0.25F, 0.25F, 0.10F, 2.0F};
+  const PointXyzi high{0.25F, 0.25F, 0.40F, 4.0F};
+  map->insert({low, low, high, high, high, high, high});
+  ASSERT_EQ(map->size(), 1U);
+  EXPECT_NEAR(map->points()[0].z, 0.25, 1e-6);
+  EXPECT_NEAR(map->points()[0].intensity, 3.0, 1e-6);
+}
+
+TEST(SurfelMap, notices_points_that_come_after_a_match) {
+  const auto map = make_surfel_map({});
+  PlaneMatch plane;
+  map->insert(ground(0.70, 14, 0.0));
+  ASSERT_TRUE(map->match({0.1, 0.1, 0.75}, plane));
+  EXPECT_NEAR(height_at(plane, 0.1, 0.1), 0.70, 1e-5);
+  SurfelMapConfig uncapped;
+  uncapped.leaf_capacity = 100000;
+  const auto both = make_surfel_map(uncapped);
+  both->insert(ground(0.70, 14, 0.0));
+  ASSERT_TRUE(both->match({0.1, 0.1, 0.75}, plane));
+  both->insert(ground(0.80, 14, 0.0));
+  ASSERT_TRUE(both->match({0.1, 0.1, 0.75}, plane));
+  EXPECT_NEAR(height_at(plane, 0.1, 0.1), 0.75, 1e-5);
+}
+
+using LeafKey = std::tuple<int, int, int>;
+
+LeafKey leaf_of(const PointXyzi& p, double side_m) {
+  return {static_cast<int>(std::floor(p.x / side_m)),
+          static_cast<int>(std::floor(p.y / side_m)),
+          static_cast<int>(std::floor(p.z / side_m))};
+}
+
+TEST(SurfelMap, prune_forgets_exactly_what_is_outside) {
+  PointCloud blob;
+  for (const Eigen::Vector3d& p : random_points(20000, 12.0, 15)) {
+    blob.push_back(point_of(away_from_faces(p)));
+  }
+  const auto map = make_surfel_map({});
+  map->insert(blob);
+  const Eigen::Vector3d center(2.3, -1.1, 0.4);
+  constexpr double kHalf_m = 6.2;
+  std::map<LeafKey, PointXyzi> expected;
+  for (const PointXyzi& p : map->points()) {
+    if ((p.position().cast<double>() - center).cwiseAbs().maxCoeff() <= kHalf_m) {
+      expected[leaf_of(p, kLeaf_m)] = p;
+    }
+  }
+  map->prune(center, kHalf_m);
+  ASSERT_GT(expected.size(), 1000U);
+  EXPECT_EQ(map->size(), expected.size());
+  const PointCloud left = map->points();
+  ASSERT_EQ(left.size(), expected.size());
+  for (const PointXyzi& p : left) {
+    ASSERT_EQ(expected.count(leaf_of(p, kLeaf_m)), 1U);
+    EXPECT_EQ(expected[leaf_of(p, kLeaf_m)].position(), p.position());
+  }
+}
+
+TEST(SurfelMap, after_prune_matches_as_if_the_rest_had_never_been) {
+  // A capacity of one makes the leaf means the points themselves, so a fresh map can be made of
+  // them.
+  SurfelMapConfig config;
+  config.leaf_capacity = 1;
+  const auto pruned = make_surfel_map(config);
+  for (PointCloud cloud : {ground(0.7, 16), corner(17)}) {
+    for (PointXyzi& p : cloud) {
+      p = point_of(away_from_faces(p.position().cast<double>()));
+    }
+    pruned->insert(cloud);
+  }
+  PlaneMatch warm;
+  for (const Eigen::Vector3d& p : random_points(3000, 9.0, 18)) {
+    pruned->match(p, warm);
+  }
+  pruned->prune({1.0, 1.0, 0.0}, 4.3);
+  const auto fresh = make_surfel_map(config);
+  fresh->insert(pruned->points());
+  int matched = 0;
+  for (const Eigen::Vector3d& p : random_points(3000, 6.0, 19)) {
+    PlaneMatch a;
+    PlaneMatch b;
+    const bool found = pruned->match(p, a);
+    ASSERT_EQ(found, fresh->match(p, b));
+    if (found) {
+      ++matched;
+      EXPECT_NEAR(a.normal.dot(p) + a.offset_m, b.normal.dot(p) + b.offset_m, 1e-6);
+    }
+  }
+  EXPECT_GT(matched, 100);
+}
+
+TEST(SurfelMap, can_be_filled_again_after_everything_is_pruned) {
+  const auto map = make_surfel_map({});
+  map->insert(ground(0.7, 20));
+  map->prune({1000.0, 0.0, 0.0}, 5.0);
+  EXPECT_TRUE(map->empty());
+  PlaneMatch plane;
+  EXPECT_FALSE(map->match({0.0, 0.0, 0.7}, plane));
+  map->insert(ground(0.7, 20));
+  EXPECT_TRUE(map->match({0.0, 0.0, 0.7}, plane));
+}
+
+TEST(SurfelMap, same_input_gives_the_same_bits_whoever_asked_before) {
+  const auto first = make_surfel_map({});
+  const auto second = make_surfel_map({});
+  const PointCloud a = ground(0.0, 21);
+  const PointCloud b = corner(22);
+  PlaneMatch plane;
+  for (const auto& map : {first.get(), second.get()}) {
+    map->insert(a);
+    if (map == second.get()) {
+      for (const Eigen::Vector3d& p : random_points(500, 8.0, 23)) {
+        map->match(p, plane);
+      }
+    }
+    map->insert(b);
+    map->prune({0.0, 0.0, 0.0}, 8.0);
+  }
+  for (const Eigen::Vector3d& p : random_points(2000, 9.0, 24)) {
+    PlaneMatch one;
+    PlaneMatch two;
+    ASSERT_EQ(first->match(p, one), second->match(p, two));
+    EXPECT_TRUE(same_bits(one, two));
+  }
+}
+
+TEST(SurfelMap, threads_that_match_at_once_get_the_bits_of_one_thread) {
+  const auto map = make_surfel_map({});
+  const auto reference = make_surfel_map({});
+  for (const auto& m : {map.get(), reference.get()}) {
+    m->insert(ground(0.0, 25));
+    m->insert(corner(26));
+  }
+  const auto asked = random_points(20000, 9.0, 27);
+  std::vector<std::vector<PlaneMatch>> answers(4, std::vector<PlaneMatch>(asked.size()));
+  std::vector<std::thread> threads;
+  for (auto& answer : answers) {
+    threads.emplace_back([&asked, &answer, &map] {
+      for (std::size_t i = 0; i < asked.size(); ++i) {
+        map->match(asked[i], answer[i]);
+      }
+    });
+  }
+  for (std::thread& thread : threads) {
+    thread.join();
+  }
+  for (std::size_t i = 0; i < asked.size(); ++i) {
+    PlaneMatch expected;
+    reference->match(asked[i], expected);
+    for (const auto& answer : answers) {
+      ASSERT_TRUE(same_bits(answer[i], expected)) << i;
+    }
+  }
+}
+
+// ---- Against brute force: all leaf means, two-pass covariance, iterative eigen-solver --------
+
+struct BrutePlane {
+  Eigen::Vector3d normal;
+  Eigen::Vector3d centroid;
+  double thickness2_m2;
+  double flatness;
+};
+
+std::optional<BrutePlane> brute_fit(const std::vector<Eigen::Vector3d>& points,
+                                    const SurfelMapConfig& config) {
+  if (points.size() < 5) {
+    return std::nullopt;
+  }
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const auto& p : points) {
+    mean += p / static_cast<double>(points.size());
+  }
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  for (const auto& p : points) {
+    covariance += (p - mean) * (p - mean).transpose() / static_cast<double>(points.size());
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance);
+  const Eigen::Vector3d values = solver.eigenvalues();
+  if (values[0] > config.max_flatness * values[2] || values[1] < config.min_linearity * values[2]) {
+    return std::nullopt;
+  }
+  return BrutePlane{solver.eigenvectors().col(0), mean, values[0], values[0] / values[2]};
+}
+
+/// Leaf means whose leaf lies in the parent `home` widened by `reach` leaves on each axis.
+std::vector<Eigen::Vector3d> brute_window(const PointCloud& means,
+                                          const Eigen::Vector3i& home,
+                                          const Eigen::Vector3i& reach) {
+  std::vector<Eigen::Vector3d> inside;
+  for (const PointXyzi& p : means) {
+    const auto [x, y, z] = leaf_of(p, kLeaf_m);
+    const Eigen::Array3i from_first = Eigen::Array3i(x, y, z) - 3 * home.array();
+    if ((from_first >= -reach.array()).all() && (from_first < 3 + reach.array()).all()) {
+      inside.push_back(p.position().cast<double>());
+    }
+  }
+  return inside;
+}
+
+std::optional<BrutePlane> brute_plane(const PointCloud& means,
+                                      const Eigen::Vector3i& home,
+                                      const SurfelMapConfig& config) {
+  const auto own = brute_window(means, home, {0, 0, 0});
+  if (own.size() < 3) {
+    return std::nullopt;
+  }
+  if (auto whole = brute_fit(brute_window(means, home, {1, 1, 1}), config)) {
+    return whole;
+  }
+  std::optional<BrutePlane> best;
+  for (const Eigen::Vector3i& axis : {Eigen::Vector3i(1, 0, 0), {0, 1, 0}, {0, 0, 1}}) {
+    const auto window = brute_window(means, home, axis);
+    const auto plane = window.size() > own.size() ? brute_fit(window, config) : std::nullopt;
+    if (plane && (!best || plane->flatness < best->flatness)) {
+      best = plane;
+    }
+  }
+  return best ? best : brute_fit(own, config);
+}
+
+/// The match's definition: parents within 0.4 m, cheapest plane by distance along and 3 x across.
+std::optional<BrutePlane> brute_match(const PointCloud& means,
+                                      const Eigen::Vector3d& p,
+                                      const SurfelMapConfig& config) {
+  constexpr double kReach_m = 0.4;
+  std::optional<BrutePlane> best;
+  double least = std::numeric_limits<double>::infinity();
+  const auto cell = [](double v) { return static_cast<int>(std::floor(v / kParent_m)); };
+  for (int x = cell(p.x() - kReach_m); x <= cell(p.x() + kReach_m); ++x) {
+    for (int y = cell(p.y() - kReach_m); y <= cell(p.y() + kReach_m); ++y) {
+      for (int z = cell(p.z() - kReach_m); z <= cell(p.z() + kReach_m); ++z) {
+        const auto plane = brute_plane(means, {x, y, z}, config);
+        if (!plane) {
+          continue;
+        }
+        const Eigen::Vector3d offset = p - plane->centroid;
+        const double across = std::abs(plane->normal.dot(offset));
+        const double along2 = offset.squaredNorm() - across * across;
+        const double cost = along2 + std::pow(3.0 * across, 2);
+        if (across < config.max_residual_m && cost < least) {
+          least = cost;
+          best = plane;
+        }
+      }
+    }
+  }
+  return best;
+}
+
+TEST(SurfelMap, agrees_with_brute_force_over_the_same_leaf_means) {
+  const SurfelMapConfig config;
+  constexpr double kSame_m = 1e-5;  // means are compared after rounding to float
+  int matched = 0;
+  for (unsigned seed = 0; seed < 4; ++seed) {
+    const auto map = make_surfel_map(config);
+    PointCloud cloud;
+    for (const Eigen::Vector3d& p : random_points(400, 5.0, 40 + seed)) {
+      // Rough relief with steps, folded to a band: planes, edges and clutter.
+      const double z = 0.3 * p.x() + (p.y() > 0.0 ? 0.9 : 0.0) + 0.04 * p.z();
+      cloud.push_back(point_of(away_from_faces({p.x(), p.y(), z})));
+    }
+    map->insert(cloud);
+    const PointCloud means = map->points();
+    for (const Eigen::Vector3d& q : random_points(300, 4.5, 50 + seed)) {
+      const Eigen::Vector3d p(q.x(), q.y(), 0.3 * q.x() + 0.4 + 0.2 * q.z());
+      PlaneMatch plane;
+      const auto expected = brute_match(means, p, config);
+      ASSERT_EQ(map->match(p, plane), expected.has_value());
+      if (expected) {
+        ++matched;
+        EXPECT_NEAR(std::abs(plane.normal.dot(p) + plane.offset_m),
+                    std::abs(expected->normal.dot(p - expected->centroid)),
+                    kSame_m);
+        EXPECT_NEAR(std::abs(plane.normal.dot(expected->normal)), 1.0, kSame_m);
+        EXPECT_NEAR(plane.thickness2_m2, expected->thickness2_m2 + 2.5e-5, kSame_m);
+      }
+    }
+  }
+  EXPECT_GT(matched, 300);
+}
+
+}  // namespace
+}  // namespace trigpoint::lio_mapper
