@@ -13,9 +13,41 @@ class ConfigFields;
 
 namespace trigpoint::fusion_gate {
 
+/// How the first T_map_odom is found (README, "Alignment").
+struct AlignmentConfig {
+  double max_yaw_sigma_rad{0.0174533};  ///< admitted below this (1 degree)
+  double min_baseline_m{5.0};           ///< horizontal extent of the pairs
+  std::int64_t min_pairs{5};
+  std::int64_t max_pairs{120};  ///< above it every second one is dropped
+  double pair_spacing_m{0.25};  ///< a nearer pair is taken only after pair_spacing_s
+  double pair_spacing_s{2.0};
+  double window_m{200.0};               ///< pairs driven longer ago are forgotten: LIO drifts
+  double max_interpolation_gap_s{0.6};  ///< between two LIO poses
+  double correlation_time_s{40.0};      ///< of the slow part of the GPS error
+  double correlated_share{0.7};         ///< of the reported variance: Gauss-Markov
+  double white_share{0.5};              ///< of the reported variance: new at every fix
+  double lio_drift_m_per_sqrt_m{0.02};  ///< random walk of LIO with the distance driven
+  double residual_tolerance{4.0};       ///< chi-square may exceed its 99.9 % quantile by this
+};
+
 /// The only defaults of fusion_gate; every field is described (unit, rule) in src/config.cpp.
 struct Config {
-  // Filled in by the implementer of the core.
+  std::string mode{"hard"};                  ///< lio, fusion, literal, hard
+  Eigen::Vector3d threshold{0.5, 0.5, 1.0};  ///< m, or m^2 when threshold_on is "variance"
+  std::string threshold_on{"sigma"};         ///< sigma, variance
+  double min_sigma_m{0.02};                  ///< floor of a fix's sigma
+  double gps_correlation_time_s{5.0};        ///< row covariance x (1 + 2 tau / dt)
+  double max_inflation{100.0};               ///< of that factor
+  double max_fix_age_s{1.0};                 ///< against LIO's newest stamp
+  double source_timeout_s{1.0};              ///< a GPS writer not heard for longer is stale
+  double source_hold_s{0.5};                 ///< a healthier one must stay so for this long
+  double lio_timeout_s{1.0};                 ///< then the GPS odometry carries fusion/odometry
+  double gps_only_after_s{10.0};             ///< the same where there has never been a LIO
+  double imu_rate_timeout_s{0.5};            ///< then lio/odometry carries fusion/odometry
+  double status_period_s{0.2};               ///< of fusion/status between fixes, data time
+  double foreign_after_s{2.0};               ///< a GPS writer without gps/status is foreign then
+  double unknown_fix_sigma_m{3.0};           ///< of a raw fix that says nothing about itself
+  AlignmentConfig alignment;
 };
 
 void describe(Config& config, ConfigFields& fields);

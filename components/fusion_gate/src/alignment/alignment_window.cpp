@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "alignment/alignment_window.hpp"
+
+#include <algorithm>
+
+namespace trigpoint::fusion_gate {
+
+bool AlignmentWindow::add(const AlignmentPair& pair) {
+  if (is_redundant(pair)) {
+    return false;
+  }
+  pairs_.push_back(pair);
+  bound();
+  solve();
+  return true;
+}
+
+void AlignmentWindow::clear() {
+  *this = AlignmentWindow(config_);
+}
+
+bool AlignmentWindow::is_redundant(const AlignmentPair& pair) const {
+  if (pairs_.empty()) {
+    return false;
+  }
+  const AlignmentPair& last = pairs_.back();
+  const double age_s = to_seconds(pair.stamp_ns - last.stamp_ns);
+  const double step_m = (pair.p_odom_m - last.p_odom_m).norm();
+  return age_s <= 0.0 || (step_m < spacing_factor_ * config_.pair_spacing_m &&
+                          age_s < spacing_factor_ * config_.pair_spacing_s);
+}
+
+void AlignmentWindow::bound() {
+  const double oldest_m = pairs_.back().distance_m - config_.window_m;
+  std::erase_if(pairs_, [&](const AlignmentPair& pair) { return pair.distance_m < oldest_m; });
+  if (pairs_.size() <= static_cast<std::size_t>(config_.max_pairs)) {
+    return;
+  }
+  std::vector<AlignmentPair> kept;
+  for (std::size_t k = (pairs_.size() - 1) % 2; k < pairs_.size(); k += 2) {  // keeps the newest
+    kept.push_back(pairs_[k]);
+  }
+  pairs_ = std::move(kept);
+  spacing_factor_ *= 2.0;
+}
+
+void AlignmentWindow::solve() {
+  solution_ = solve_alignment(pairs_, config_);
+  obstacle_ = solution_ ? find_obstacle(*solution_, config_)
+                        : std::optional<std::string>("no finite solution");
+  // A wrong stretch at the start must not block the alignment for as long as it is in the window.
+  std::size_t skipped = pairs_.size() / 2;
+  while (obstacle_ && pairs_.size() - skipped >= static_cast<std::size_t>(config_.min_pairs)) {
+    const std::vector<AlignmentPair> newest(pairs_.begin() + static_cast<std::ptrdiff_t>(skipped),
+                                            pairs_.end());
+    const auto candidate = solve_alignment(newest, config_);
+    if (candidate && !find_obstacle(*candidate, config_)) {
+      solution_ = candidate;
+      obstacle_.reset();
+    }
+    skipped += (pairs_.size() - skipped + 1) / 2;
+  }
+}
+
+}  // namespace trigpoint::fusion_gate

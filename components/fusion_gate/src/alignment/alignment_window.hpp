@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#pragma once
+
+#include "alignment/yaw_alignment.hpp"
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace trigpoint::fusion_gate {
+
+/// The pairs of the newest stretch, and the alignment that follows from them.
+class AlignmentWindow {
+ public:
+  explicit AlignmentWindow(const AlignmentConfig& config) : config_(config) {}
+
+  /// Adds and solves. False when the pair says nothing new (too near to the last one, too soon, or
+  /// not newer than it).
+  bool add(const AlignmentPair& pair);
+
+  void clear();
+
+  /// Of the whole window; when that is refused for its residuals, of the newest part that is not.
+  const std::optional<AlignmentSolution>& solution() const { return solution_; }
+
+  /// Why it must not be used yet; nullopt when it may. A sentence also before the first pair.
+  const std::optional<std::string>& obstacle() const { return obstacle_; }
+
+  bool admitted() const { return solution_ && !obstacle_; }
+
+ private:
+  bool is_redundant(const AlignmentPair& pair) const;
+  void bound();
+  void solve();
+
+  AlignmentConfig config_;
+  std::vector<AlignmentPair> pairs_;
+  double spacing_factor_{1.0};
+  std::optional<AlignmentSolution> solution_;
+  std::optional<std::string> obstacle_{"no matched fix yet"};
+};
+
+}  // namespace trigpoint::fusion_gate

@@ -1,0 +1,291 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// References: [1] B. K. P. Horn, "Closed-form solution of absolute orientation using unit
+// quaternions", JOSA A 4 (1987), restricted to rotations about z. [2] P. W. Holland, R. E. Welsch,
+// "Robust regression using iteratively reweighted least-squares", 1977 (Cauchy weight). [3] E. B.
+// Wilson, M. M. Hilferty, "The distribution of chi-square", PNAS 17 (1931).
+#include "alignment/yaw_alignment.hpp"
+
+#include "trigpoint/base/so3.hpp"
+
+#include <Eigen/Cholesky>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+namespace trigpoint::fusion_gate {
+
+namespace {
+
+using Weights = Eigen::VectorXd;  // one a pair, 1 = fully trusted
+
+// [2]: beyond this many sigmas a residual loses its influence. 3 rather than the 95 % value 2.385,
+// because the sigmas here already are on the cautious side.
+constexpr double kCauchyScale = 3.0;
+constexpr double kOutlierWeight = 0.3;  // a residual above 4.6 sigma
+constexpr double kMaxOutlierShare = 0.35;
+constexpr int kClosedFormIterations = 15;
+constexpr int kMaxIterations = 15;
+constexpr double kConverged = 1e-10;  // rad and m
+// Yaw lies within half a turn: the only prior, so that one pair alone leaves a regular system.
+constexpr double kYawPriorInformation = 1.0 / (std::numbers::pi * std::numbers::pi);
+
+double cauchy_weight(double squared_sigmas) {
+  return 1.0 / (1.0 + squared_sigmas / (kCauchyScale * kCauchyScale));
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// [1]: minimises sum w |p_map - (R p_odom + t)|^2 over yaw and translation.
+YawPose closed_form(const std::vector<AlignmentPair>& pairs, const Weights& weights) {
+  Eigen::Vector3d mean_map = Eigen::Vector3d::Zero();
+  Eigen::Vector3d mean_odom = Eigen::Vector3d::Zero();
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    const double w = weights[static_cast<Eigen::Index>(k)];
+    mean_map += w * pairs[k].p_map_m;
+    mean_odom += w * pairs[k].p_odom_m;
+  }
+  mean_map /= weights.sum();
+  mean_odom /= weights.sum();
+  double dot = 0.0;
+  double cross = 0.0;
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    const double w = weights[static_cast<Eigen::Index>(k)];
+    const Eigen::Vector3d a = pairs[k].p_odom_m - mean_odom;
+    const Eigen::Vector3d b = pairs[k].p_map_m - mean_map;
+    dot += w * (a.x() * b.x() + a.y() * b.y());
+    cross += w * (a.x() * b.y() - a.y() * b.x());
+  }
+  const double yaw_rad = std::atan2(cross, dot);
+  return {yaw_rad, mean_map - from_yaw(yaw_rad) * mean_odom};
+}
+
+Eigen::Vector3d residual_of(const AlignmentPair& pair, const Pose& T_map_odom) {
+  return pair.p_map_m - T_map_odom * pair.p_odom_m;
+}
+
+/// A start that a few wild fixes cannot turn: weights from the residuals' own median.
+YawPose robust_closed_form(const std::vector<AlignmentPair>& pairs) {
+  Weights base(static_cast<Eigen::Index>(pairs.size()));
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    base[static_cast<Eigen::Index>(k)] = 1.0 / pairs[k].variance_map_m2.head<2>().sum();
+  }
+  Weights weights = base;
+  YawPose estimate = closed_form(pairs, weights);
+  for (int iteration = 0; iteration < kClosedFormIterations; ++iteration) {
+    const Pose T_map_odom = estimate.pose();
+    std::vector<double> squared_sigmas;
+    for (const AlignmentPair& pair : pairs) {
+      squared_sigmas.push_back(residual_of(pair, T_map_odom).head<2>().squaredNorm() /
+                               pair.variance_map_m2.head<2>().sum());
+    }
+    const double scale = std::max(1.0, median(squared_sigmas));
+    for (Eigen::Index k = 0; k < weights.size(); ++k) {
+      weights[k] = base[k] * cauchy_weight(squared_sigmas[static_cast<std::size_t>(k)] / scale);
+    }
+    estimate = closed_form(pairs, weights);
+  }
+  return estimate;
+}
+
+double drift_variance(const AlignmentPair& pair, double now_m, const AlignmentConfig& config) {
+  return config.lio_drift_m_per_sqrt_m * config.lio_drift_m_per_sqrt_m * (now_m - pair.distance_m);
+}
+
+double total_variance(const AlignmentPair& pair, int axis, double now_m, const AlignmentConfig& c) {
+  return (c.correlated_share + c.white_share) * pair.variance_map_m2[axis] +
+         drift_variance(pair, now_m, c);
+}
+
+/// Of one axis' residuals: Gauss-Markov GPS error, LIO's random walk counted back from the newest
+/// pair (so that the solution is T_map_odom as of now), and white error grown where distrusted.
+Eigen::MatrixXd residual_covariance(const std::vector<AlignmentPair>& pairs,
+                                    int axis,
+                                    const Weights& weights,
+                                    const AlignmentConfig& config) {
+  const auto n = static_cast<Eigen::Index>(pairs.size());
+  const double now_m = pairs.back().distance_m;
+  Eigen::MatrixXd covariance(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const AlignmentPair& a = pairs[static_cast<std::size_t>(i)];
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      const AlignmentPair& b = pairs[static_cast<std::size_t>(j)];
+      const double age_s = std::abs(to_seconds(a.stamp_ns - b.stamp_ns));
+      const double sigmas_m2 = std::sqrt(a.variance_map_m2[axis] * b.variance_map_m2[axis]);
+      covariance(i, j) =
+          config.correlated_share * sigmas_m2 * std::exp(-age_s / config.correlation_time_s) +
+          std::min(drift_variance(a, now_m, config), drift_variance(b, now_m, config));
+      covariance(j, i) = covariance(i, j);
+    }
+    covariance(i, i) += config.white_share * a.variance_map_m2[axis] / weights[i];
+  }
+  return covariance;
+}
+
+struct Linearised {
+  Eigen::Matrix4d information{Eigen::Matrix4d::Zero()};
+  Eigen::Vector4d gradient{Eigen::Vector4d::Zero()};
+  double chi_square{0.0};
+};
+
+struct RobustWeights {
+  Weights horizontal;
+  Weights vertical;
+};
+
+RobustWeights weigh(const std::vector<AlignmentPair>& pairs,
+                    const YawPose& estimate,
+                    const AlignmentConfig& config) {
+  const auto n = static_cast<Eigen::Index>(pairs.size());
+  RobustWeights weights{Weights(n), Weights(n)};
+  const Pose T_map_odom = estimate.pose();
+  const double now_m = pairs.back().distance_m;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const AlignmentPair& pair = pairs[static_cast<std::size_t>(k)];
+    const Eigen::Vector3d r = residual_of(pair, T_map_odom);
+    Eigen::Vector3d squared_sigmas;
+    for (int axis = 0; axis < 3; ++axis) {
+      squared_sigmas[axis] = r[axis] * r[axis] / total_variance(pair, axis, now_m, config);
+    }
+    weights.horizontal[k] = cauchy_weight(squared_sigmas.head<2>().sum());
+    weights.vertical[k] = cauchy_weight(squared_sigmas.z());
+  }
+  return weights;
+}
+
+using Factor = Eigen::LLT<Eigen::MatrixXd>;
+
+Linearised linearise(const std::vector<AlignmentPair>& pairs,
+                     const YawPose& estimate,
+                     const std::array<Factor, 3>& factors) {
+  const auto n = static_cast<Eigen::Index>(pairs.size());
+  const Pose T_map_odom = estimate.pose();
+  Linearised result;
+  for (int axis = 0; axis < 3; ++axis) {
+    Eigen::VectorXd r(n);
+    Eigen::MatrixX4d jacobian = Eigen::MatrixX4d::Zero(n, 4);  // of the prediction: yaw, x, y, z
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const AlignmentPair& pair = pairs[static_cast<std::size_t>(k)];
+      const Eigen::Vector3d turned = T_map_odom.q * pair.p_odom_m;
+      r[k] = residual_of(pair, T_map_odom)[axis];
+      jacobian(k, 0) = Eigen::Vector3d::UnitZ().cross(turned)[axis];
+      jacobian(k, 1 + axis) = 1.0;
+    }
+    const Factor& factor = factors[static_cast<std::size_t>(axis)];
+    const Eigen::MatrixX4d whitened = factor.matrixL().solve(jacobian);
+    const Eigen::VectorXd whitened_r = factor.matrixL().solve(r);
+    result.information += whitened.transpose() * whitened;
+    result.gradient += whitened.transpose() * whitened_r;
+    result.chi_square += whitened_r.squaredNorm();
+  }
+  result.information(0, 0) += kYawPriorInformation;
+  return result;
+}
+
+std::array<Factor, 3> factorise(const std::vector<AlignmentPair>& pairs,
+                                const RobustWeights& weights,
+                                const AlignmentConfig& config) {
+  return {Factor(residual_covariance(pairs, 0, weights.horizontal, config)),
+          Factor(residual_covariance(pairs, 1, weights.horizontal, config)),
+          Factor(residual_covariance(pairs, 2, weights.vertical, config))};
+}
+
+double horizontal_extent(const std::vector<AlignmentPair>& pairs) {
+  Eigen::Vector2d lowest = pairs.front().p_odom_m.head<2>();
+  Eigen::Vector2d highest = lowest;
+  for (const AlignmentPair& pair : pairs) {
+    lowest = lowest.cwiseMin(pair.p_odom_m.head<2>());
+    highest = highest.cwiseMax(pair.p_odom_m.head<2>());
+  }
+  return (highest - lowest).norm();
+}
+
+/// [3], the 99.9 % quantile.
+double chi_square_quantile(double degrees_of_freedom) {
+  constexpr double kStandardNormal999 = 3.0902;
+  const double v = 2.0 / (9.0 * degrees_of_freedom);
+  return degrees_of_freedom * std::pow(1.0 - v + kStandardNormal999 * std::sqrt(v), 3.0);
+}
+
+double outlier_share_of(const RobustWeights& weights) {
+  const auto outliers =
+      (weights.horizontal.array().min(weights.vertical.array()) < kOutlierWeight).count();
+  return static_cast<double>(outliers) / static_cast<double>(weights.horizontal.size());
+}
+
+std::string sentence(const char* format, double value, double limit) {
+  std::array<char, 128> text{};
+  std::snprintf(text.data(), text.size(), format, value, limit);
+  return text.data();
+}
+
+}  // namespace
+
+double AlignmentSolution::yaw_sigma_rad() const {
+  return std::sqrt(covariance(0, 0));
+}
+
+std::optional<AlignmentSolution> solve_alignment(const std::vector<AlignmentPair>& pairs,
+                                                 const AlignmentConfig& config) {
+  if (pairs.empty()) {
+    return std::nullopt;
+  }
+  YawPose estimate = robust_closed_form(pairs);
+  Linearised system;
+  RobustWeights weights;
+  for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
+    weights = weigh(pairs, estimate, config);
+    system = linearise(pairs, estimate, factorise(pairs, weights, config));
+    const Eigen::Vector4d step = system.information.ldlt().solve(system.gradient);
+    estimate = {wrap_angle(estimate.yaw_rad + step[0]), estimate.p + step.tail<3>()};
+    if (!step.allFinite() || step.norm() < kConverged) {
+      break;
+    }
+  }
+  AlignmentSolution solution;
+  solution.T_map_odom = estimate;
+  solution.pairs = pairs.size();
+  solution.baseline_m = horizontal_extent(pairs);
+  const double dof = std::max(1.0, 3.0 * static_cast<double>(pairs.size()) - 4.0);
+  solution.chi_square = system.chi_square;
+  solution.chi_square_limit = config.residual_tolerance * chi_square_quantile(dof);
+  solution.outlier_share = outlier_share_of(weights);
+  solution.covariance = system.information.ldlt().solve(Eigen::Matrix4d::Identity()) *
+                        std::max(1.0, system.chi_square / dof);
+  const bool finite = estimate.pose().is_finite() && solution.covariance.allFinite();
+  return finite ? std::optional(solution) : std::nullopt;
+}
+
+std::optional<std::string> find_obstacle(const AlignmentSolution& solution,
+                                         const AlignmentConfig& config) {
+  if (solution.pairs < static_cast<std::size_t>(config.min_pairs)) {
+    return sentence("%.0f matched fixes of %.0f needed",
+                    static_cast<double>(solution.pairs),
+                    static_cast<double>(config.min_pairs));
+  }
+  if (solution.baseline_m < config.min_baseline_m) {
+    return sentence("baseline %.1f m < %.1f m", solution.baseline_m, config.min_baseline_m);
+  }
+  if (solution.outlier_share > kMaxOutlierShare) {
+    return sentence("share of outliers %.2f > %.2f", solution.outlier_share, kMaxOutlierShare);
+  }
+  if (solution.chi_square > solution.chi_square_limit) {
+    return sentence("chi-square %.1f > %.1f", solution.chi_square, solution.chi_square_limit);
+  }
+  if (!(solution.yaw_sigma_rad() < config.max_yaw_sigma_rad)) {
+    constexpr double kDegrees = 180.0 / std::numbers::pi;
+    return sentence("yaw sigma %.2f deg, needs < %.2f deg",
+                    solution.yaw_sigma_rad() * kDegrees,
+                    config.max_yaw_sigma_rad * kDegrees);
+  }
+  return std::nullopt;
+}
+
+}  // namespace trigpoint::fusion_gate

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// The 4-DoF transform (yaw, x, y, z) between two level frames from matched positions.
+#pragma once
+
+#include "trigpoint/base/pose.hpp"
+#include "trigpoint/base/time.hpp"
+#include "trigpoint/fusion_gate/config.hpp"
+
+#include <Eigen/Core>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace trigpoint::fusion_gate {
+
+/// The antenna at one moment, seen from both sides.
+struct AlignmentPair {
+  Nanoseconds stamp_ns{0};
+  Eigen::Vector3d p_map_m{Eigen::Vector3d::Zero()};
+  Eigen::Vector3d variance_map_m2{Eigen::Vector3d::Ones()};  ///< of p_map_m, per axis
+  Eigen::Vector3d p_odom_m{Eigen::Vector3d::Zero()};
+  double distance_m{0.0};  ///< driven when the pair was made
+};
+
+struct AlignmentSolution {
+  YawPose T_map_odom;          ///< as of the newest pair
+  Eigen::Matrix4d covariance;  ///< yaw, x, y, z; already scaled by max(1, chi_square / dof)
+  double baseline_m{0.0};      ///< horizontal extent of the pairs
+  double chi_square{0.0};      ///< of the residuals, correlations included
+  double chi_square_limit{0.0};
+  double outlier_share{0.0};
+  std::size_t pairs{0};
+
+  double yaw_sigma_rad() const;
+};
+
+/// Robust generalised least squares (README, "Alignment"); nullopt without pairs or when nothing
+/// finite comes out. Pairs in the order of their stamps. A single pair gives a solution too, with
+/// a yaw sigma that says that yaw is not known.
+std::optional<AlignmentSolution> solve_alignment(const std::vector<AlignmentPair>& pairs,
+                                                 const AlignmentConfig& config);
+
+/// Why the solution must not be used yet, as a sentence; nullopt when it may.
+std::optional<std::string> find_obstacle(const AlignmentSolution& solution,
+                                         const AlignmentConfig& config);
+
+}  // namespace trigpoint::fusion_gate

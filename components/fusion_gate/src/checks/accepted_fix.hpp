@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#pragma once
+
+#include "trigpoint/base/messages.hpp"
+
+#include <Eigen/Core>
+
+#include <optional>
+#include <string>
+
+namespace trigpoint::fusion_gate {
+
+/// One piece of GPS information: the antenna in map at a fix's stamp, whoever says so.
+struct AcceptedFix {
+  Nanoseconds stamp_ns{0};
+  Eigen::Vector3d antenna_map_m{Eigen::Vector3d::Constant(kNaN)};
+  Eigen::Matrix3d covariance_map_m2{Eigen::Matrix3d::Identity() * kUnknownVariance};
+};
+
+/// Why something is refused: `code` is short, stable and counted, `reason` is the sentence.
+struct Refusal {
+  std::string code;
+  std::string reason;
+};
+
+/// `datum_id` is ours, empty when none is known.
+std::optional<Refusal> check_status(const GpsStatus& status, const std::string& datum_id);
+
+/// Position and covariance finite, variances above zero.
+std::optional<Refusal> check_values(const AcceptedFix& fix);
+
+/// A fix further than `max_age_s` behind LIO's newest stamp.
+std::optional<Refusal> check_age(const AcceptedFix& fix,
+                                 std::optional<Nanoseconds> lio_newest_ns,
+                                 double max_age_s);
+
+const char* name_of(GpsHealth health);
+
+}  // namespace trigpoint::fusion_gate

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "checks/foreign_source.hpp"
+
+#include "fusion/fused_odometry.hpp"
+
+namespace trigpoint::fusion_gate {
+
+namespace {
+
+constexpr Nanoseconds kBuffer_ns = 5 * kNanosecondsPerSecond;
+constexpr Nanoseconds kMaxGap_ns = 600'000'000;
+constexpr std::size_t kMaxPending = 32;
+constexpr double kUsableVariance_m2 = 1e4;  // above it the source does not know its own variance
+
+AlignmentConfig without_drift(AlignmentConfig config) {
+  config.lio_drift_m_per_sqrt_m = 0.0;  // the source is held by the same fixes
+  return config;
+}
+
+}  // namespace
+
+ForeignSource::ForeignSource(const Config& config, const Eigen::Vector3d& antenna_position_base_m)
+    : lever_arm_base_m_(antenna_position_base_m),
+      poses_(kBuffer_ns, kMaxGap_ns),
+      window_(without_drift(config.alignment)) {}
+
+std::vector<AcceptedFix> ForeignSource::on_odometry(const Odometry& odometry) {
+  Pose T_frame_antenna = odometry.T_frame_child;
+  if (odometry.child_frame_id != kAntennaFrame) {
+    T_frame_antenna.p = odometry.T_frame_child * lever_arm_base_m_;
+  }
+  poses_.add(odometry.stamp_ns, T_frame_antenna, odometry.pose_covariance);
+  return match();
+}
+
+std::vector<AcceptedFix> ForeignSource::on_fix(const AcceptedFix& fix) {
+  pending_.push_back(fix);
+  if (pending_.size() > kMaxPending) {
+    pending_.pop_front();
+  }
+  return match();
+}
+
+std::vector<AcceptedFix> ForeignSource::match() {
+  std::vector<AcceptedFix> ready;
+  while (!pending_.empty()) {
+    const PoseBuffer::Answer answer = poses_.at(pending_.front().stamp_ns);
+    if (answer.coverage == PoseBuffer::Coverage::kNotYet) {
+      break;
+    }
+    if (answer.coverage == PoseBuffer::Coverage::kCovered) {
+      if (const auto fix = add_pair(pending_.front(), answer.sample)) {
+        ready.push_back(*fix);
+      }
+    }
+    pending_.pop_front();
+  }
+  return ready;
+}
+
+std::optional<AcceptedFix> ForeignSource::add_pair(const AcceptedFix& fix,
+                                                   const PoseBuffer::Sample& at_fix) {
+  const Eigen::Matrix3d own_m2 = at_fix.covariance.topLeftCorner<3, 3>();
+  const bool knows_own =
+      own_m2.diagonal().maxCoeff() < kUsableVariance_m2 && own_m2.diagonal().minCoeff() > 0.0;
+  const Eigen::Vector3d pair_variance_m2 =
+      fix.covariance_map_m2.diagonal() +
+      (knows_own ? Eigen::Vector3d(own_m2.diagonal()) : Eigen::Vector3d::Zero());
+  window_.add({fix.stamp_ns,
+               fix.antenna_map_m,
+               pair_variance_m2,
+               at_fix.T_frame_child.p,
+               at_fix.distance_m});
+  if (!window_.admitted()) {
+    return std::nullopt;
+  }
+  Odometry antenna;
+  antenna.T_frame_child = at_fix.T_frame_child;
+  antenna.pose_covariance = at_fix.covariance;
+  if (!knows_own) {
+    antenna.pose_covariance.topLeftCorner<3, 3>() = fix.covariance_map_m2;
+  }
+  const Odometry in_map =
+      fuse(antenna, window_.solution()->T_map_odom, window_.solution()->covariance);
+  return AcceptedFix{
+      fix.stamp_ns, in_map.T_frame_child.p, in_map.pose_covariance.topLeftCorner<3, 3>()};
+}
+
+std::optional<Odometry> ForeignSource::in_map(const Odometry& odometry) const {
+  if (!window_.admitted()) {
+    return std::nullopt;
+  }
+  Odometry result = fuse(odometry, window_.solution()->T_map_odom, window_.solution()->covariance);
+  result.child_frame_id = odometry.child_frame_id;
+  return result;
+}
+
+void ForeignSource::forget_alignment() {
+  window_.clear();
+}
+
+}  // namespace trigpoint::fusion_gate

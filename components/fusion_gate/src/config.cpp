@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "trigpoint/fusion_gate/config.hpp"
+
+#include "trigpoint/base/config.hpp"
+
+namespace trigpoint::fusion_gate {
+
+namespace {
+
+void describe(AlignmentConfig& config, ConfigFields& fields) {
+  fields.number("max_yaw_sigma_rad",
+                config.max_yaw_sigma_rad,
+                "the first T_map_odom is admitted below this predicted sigma",
+                {1e-4, 0.5});
+  fields.number("min_baseline_m",
+                config.min_baseline_m,
+                "horizontal extent that the pairs must have",
+                kPositive);
+  fields.integer(
+      "min_pairs", config.min_pairs, "matched pairs that the alignment must rest on", {3, 1000});
+  fields.integer("max_pairs", config.max_pairs, "above it every second pair is dropped", {10, 500});
+  fields.number("pair_spacing_m",
+                config.pair_spacing_m,
+                "a fix nearer to the last pair makes one only after pair_spacing_s",
+                kNotNegative);
+  fields.number("pair_spacing_s", config.pair_spacing_s, "see pair_spacing_m", kNotNegative);
+  fields.number("window_m",
+                config.window_m,
+                "pairs driven longer ago are forgotten, because LIO drifts",
+                kPositive);
+  fields.number("max_interpolation_gap_s",
+                config.max_interpolation_gap_s,
+                "longest gap between two LIO poses to interpolate in",
+                kPositive);
+  fields.number("correlation_time_s",
+                config.correlation_time_s,
+                "of the slow (Gauss-Markov) part of the GPS error",
+                kPositive);
+  fields.number("correlated_share",
+                config.correlated_share,
+                "that part's share of the reported variance",
+                kNotNegative);
+  fields.number("white_share",
+                config.white_share,
+                "share of the reported variance that is new at every fix",
+                kPositive);
+  fields.number("lio_drift_m_per_sqrt_m",
+                config.lio_drift_m_per_sqrt_m,
+                "sigma of LIO's drift per axis is this times the square root of the distance",
+                kNotNegative);
+  fields.number("residual_tolerance",
+                config.residual_tolerance,
+                "residual's chi-square over its 99.9 % quantile, at most; what exceeds 1 per "
+                "degree of freedom scales the covariance",
+                kPositive);
+}
+
+}  // namespace
+
+void describe(Config& config, ConfigFields& fields) {
+  fields.choice("mode",
+                config.mode,
+                "lio: no GPS rows; fusion: every row; literal: the paper's assignment per axis; "
+                "hard: Algorithm I decides which rows enter",
+                {"lio", "fusion", "literal", "hard"});
+  fields.vector3("threshold",
+                 config.threshold,
+                 "Algorithm I, axes east north up: above it LIO keeps the axis; m, or m^2 when "
+                 "threshold_on is variance",
+                 kPositive);
+  fields.choice("threshold_on",
+                config.threshold_on,
+                "what threshold is compared with",
+                {"sigma", "variance"});
+  fields.number(
+      "min_sigma_m", config.min_sigma_m, "no fix is better than this, per axis", kPositive);
+  fields.number("gps_correlation_time_s",
+                config.gps_correlation_time_s,
+                "tau: a row's covariance is inflated by 1 + 2 tau / (time since the last row)",
+                kNotNegative);
+  fields.number("max_inflation", config.max_inflation, "of that factor", {1.0, 1e6});
+  fields.number("max_fix_age_s",
+                config.max_fix_age_s,
+                "a fix further behind LIO's newest stamp makes no row",
+                kPositive);
+  fields.number("source_timeout_s",
+                config.source_timeout_s,
+                "a GPS writer not heard for longer is stale",
+                kPositive);
+  fields.number("source_hold_s",
+                config.source_hold_s,
+                "a healthier GPS writer must stay healthier for this long before it is followed",
+                kNotNegative);
+  fields.number("lio_timeout_s",
+                config.lio_timeout_s,
+                "without LIO for longer, fusion/odometry is the GPS odometry",
+                kPositive);
+  fields.number("gps_only_after_s",
+                config.gps_only_after_s,
+                "the same before the first alignment",
+                kPositive);
+  fields.number("imu_rate_timeout_s",
+                config.imu_rate_timeout_s,
+                "without lio/odometry_imu_rate for longer, fusion/odometry follows lio/odometry",
+                kPositive);
+  fields.number("status_period_s",
+                config.status_period_s,
+                "of fusion/status between fixes, data time",
+                kPositive);
+  fields.number("foreign_after_s",
+                config.foreign_after_s,
+                "a GPS writer that sent no gps/status for this long is a plain foreign one, whose "
+                "frame is estimated",
+                kNotNegative);
+  fields.number("unknown_fix_sigma_m",
+                config.unknown_fix_sigma_m,
+                "sigma of a raw fix without a covariance (foreign GPS sources only)",
+                kPositive);
+  fields.section("alignment", "how the first T_map_odom is found", [&](ConfigFields& section) {
+    describe(config.alignment, section);
+  });
+}
+
+}  // namespace trigpoint::fusion_gate

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "fusion/fused_odometry.hpp"
+
+#include "trigpoint/base/so3.hpp"
+
+namespace trigpoint::fusion_gate {
+
+namespace {
+
+// An orientation with a yaw variance above this says nothing about a lever arm of some metres.
+constexpr double kUsableYawVariance_rad2 = 0.1;
+
+}  // namespace
+
+Odometry fuse(const Odometry& lio, const YawPose& T_map_odom, const Eigen::Matrix4d& T_covariance) {
+  const Pose T = T_map_odom.pose();
+  Odometry fused = lio;
+  fused.frame_id = "map";
+  fused.child_frame_id = "base_link";
+  fused.T_frame_child = T * lio.T_frame_child;
+
+  const Eigen::Matrix3d R_map_odom = T.q.toRotationMatrix();
+  Matrix6d by_pose = Matrix6d::Zero();
+  by_pose.topLeftCorner<3, 3>() = R_map_odom;
+  by_pose.bottomRightCorner<3, 3>() = R_map_odom;
+
+  Eigen::Matrix<double, 6, 4> by_transform = Eigen::Matrix<double, 6, 4>::Zero();
+  by_transform.block<3, 1>(0, 0) = Eigen::Vector3d::UnitZ().cross(R_map_odom * lio.T_frame_child.p);
+  by_transform.block<3, 3>(0, 1) = Eigen::Matrix3d::Identity();
+  by_transform(5, 0) = 1.0;
+
+  fused.pose_covariance = by_pose * lio.pose_covariance * by_pose.transpose() +
+                          by_transform * T_covariance * by_transform.transpose();
+  return fused;
+}
+
+Odometry move_to_base(const Odometry& gps, const Eigen::Vector3d& antenna_position_base_m) {
+  Odometry base = gps;
+  base.frame_id = "map";
+  base.child_frame_id = "base_link";
+  if (gps.child_frame_id != kAntennaFrame) {
+    return base;
+  }
+  if (!(gps.pose_covariance(5, 5) < kUsableYawVariance_rad2)) {
+    base.pose_covariance.topLeftCorner<3, 3>() +=
+        antenna_position_base_m.squaredNorm() * Eigen::Matrix3d::Identity();
+    return base;
+  }
+  const Eigen::Vector3d lever_map_m = gps.T_frame_child.q * antenna_position_base_m;
+  base.T_frame_child.p -= lever_map_m;
+  Matrix6d by_antenna = Matrix6d::Identity();  // d(p - R l) = dp + [R l]x dtheta
+  by_antenna.topRightCorner<3, 3>() = hat(lever_map_m);
+  base.pose_covariance = by_antenna * gps.pose_covariance * by_antenna.transpose();
+  return base;
+}
+
+}  // namespace trigpoint::fusion_gate
