@@ -63,13 +63,16 @@ LineFile::~LineFile() {
 }
 
 void LineFile::continue_after_last_whole_line() {
-  size_ = ::lseek(descriptor_, 0, SEEK_END);
+  const off_t end = ::lseek(descriptor_, 0, SEEK_END);
+  size_ = end < 0 ? 0 : end;  // a pipe has no position
   char last = '\n';
   while (size_ > 0 && ::pread(descriptor_, &last, 1, size_ - 1) == 1 && last != '\n') {
     --size_;
   }
-  if (size_ < 0 || ::ftruncate(descriptor_, size_) != 0 ||
-      ::lseek(descriptor_, size_, SEEK_SET) < 0) {
+  if (size_ == end || end < 0) {
+    return;
+  }
+  if (::ftruncate(descriptor_, size_) != 0 || ::lseek(descriptor_, size_, SEEK_SET) < 0) {
     throw_errno(file_, "continue");
   }
 }
