@@ -1,2 +1,72 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
+#include "trigpoint/bus/config.hpp"
+
+#include "trigpoint/base/config.hpp"
+
+#include <charconv>
+#include <cstdlib>
+#include <string_view>
+
+namespace trigpoint::bus {
+
+namespace {
+
+constexpr int kHighestDomain = 232;  // ports are 7400 + 250 domain + ..., and end at 65535
+
+int domain_from_environment() {
+  const char* variable = std::getenv("ROS_DOMAIN_ID");
+  const std::string_view text = variable == nullptr ? "" : variable;
+  if (text.empty()) {
+    return 0;
+  }
+  int domain = -1;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), domain);
+  if (error != std::errc{} || end != text.data() + text.size() || domain < 0 ||
+      domain > kHighestDomain) {
+    throw ConfigError("environment variable ROS_DOMAIN_ID is '" + std::string(text) +
+                      "'; expected a whole number from 0 to " + std::to_string(kHighestDomain));
+  }
+  return domain;
+}
+
+}  // namespace
+
+void describe(Config& config, ConfigFields& fields) {
+  fields.integer("domain_id",
+                 config.domain_id,
+                 "DDS domain; -1 takes the environment variable ROS_DOMAIN_ID, or 0. On Linux keep "
+                 "it at most 101, above that its ports are also given to other programs",
+                 {-1, kHighestDomain});
+  fields.text("network_interface",
+              config.network_interface,
+              "the only interface to use, by name (eth0) or IPv4 address; empty for all");
+  fields.texts("initial_peers",
+               config.initial_peers,
+               "computers to look for where there is no multicast: \"10.0.0.2\" or "
+               "\"10.0.0.2:7410\"; name this computer too");
+  fields.integer("socket_buffer_bytes",
+                 config.socket_buffer_bytes,
+                 "wanted size of each socket buffer; what the kernel does not permit "
+                 "(net.core.rmem_max) is made up for by pacing, with a warning",
+                 {65536, 1 << 30});
+  fields.integer("datagram_bytes",
+                 config.datagram_bytes,
+                 "largest datagram sent: 65500 within one computer, 1472 between computers, where "
+                 "one lost frame would lose all of a larger one",
+                 {1200, 65500});
+  fields.number("heartbeat_s",
+                config.heartbeat_s,
+                "how often a reliable writer asks its readers what they miss",
+                {0.005, 3.0});
+  fields.number("lease_s",
+                config.lease_s,
+                "a process that is silent for so long counts as gone",
+                {0.5, 100.0});
+}
+
+int domain_of(const Config& config) {
+  return config.domain_id < 0 ? domain_from_environment() : static_cast<int>(config.domain_id);
+}
+
+}  // namespace trigpoint::bus

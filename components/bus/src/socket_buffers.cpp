@@ -1,2 +1,52 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
+#include "socket_buffers.hpp"
+
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+
+namespace trigpoint::bus {
+
+namespace {
+
+std::int64_t granted_bytes(int probe, int option, std::int64_t wanted_bytes) {
+  const int wanted = static_cast<int>(wanted_bytes);
+  setsockopt(probe, SOL_SOCKET, option, &wanted, sizeof wanted);
+  int doubled = 0;  // Linux reports twice the usable size: it adds room for its own bookkeeping
+  socklen_t size = sizeof doubled;
+  getsockopt(probe, SOL_SOCKET, option, &doubled, &size);
+  return std::min<std::int64_t>(doubled / 2, wanted_bytes);
+}
+
+}  // namespace
+
+SocketBuffers permitted_socket_buffers(std::int64_t wanted_bytes) {
+  const int probe = socket(AF_INET, SOCK_DGRAM, 0);
+  if (probe < 0) {
+    return {};
+  }
+  const SocketBuffers granted{granted_bytes(probe, SO_RCVBUF, wanted_bytes),
+                              granted_bytes(probe, SO_SNDBUF, wanted_bytes)};
+  close(probe);
+  return granted;
+}
+
+std::optional<Event> socket_buffer_warning(std::int64_t wanted_bytes,
+                                           const SocketBuffers& granted) {
+  const std::int64_t smaller = std::min(granted.receive_bytes, granted.send_bytes);
+  if (smaller >= kUnpacedBufferBytes) {
+    return std::nullopt;
+  }
+  return Event{Severity::kWarning,
+               0,
+               "bus_small_socket_buffers",
+               "socket buffers are " + std::to_string(smaller) + " bytes (asked for " +
+                   std::to_string(wanted_bytes) + ", wanted at least " +
+                   std::to_string(kUnpacedBufferBytes) +
+                   "); point clouds are sent paced. To raise them: sysctl -w "
+                   "net.core.rmem_max=4194304 net.core.wmem_max=4194304"};
+}
+
+}  // namespace trigpoint::bus

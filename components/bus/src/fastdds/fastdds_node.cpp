@@ -1,2 +1,118 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
+#include "fastdds_node.hpp"
+
+#include "fastdds_reader.hpp"
+#include "fastdds_writer.hpp"
+#include "transport.hpp"
+#include "wire_type.hpp"
+#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/topic/TypeSupport.hpp>
+#include <fastrtps/xmlparser/XMLProfileManager.h>
+
+#include <stdexcept>
+#include <utility>
+
+namespace trigpoint::bus {
+
+namespace dds = eprosima::fastdds::dds;
+
+namespace fastdds {
+
+namespace {
+
+/// Endpoints of one process talk over UDP like all others: one path to test, one behaviour.
+void turn_off_intraprocess_delivery() {
+  eprosima::fastrtps::LibrarySettingsAttributes settings;
+  settings.intraprocess_delivery = eprosima::fastrtps::INTRAPROCESS_OFF;
+  eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(settings);
+}
+
+}  // namespace
+
+FastNode::FastNode(const Config& config, const std::string& name, EventSink sink)
+    : config_(config), sink_(std::move(sink)) {
+  const SocketBuffers buffers = permitted_socket_buffers(config.socket_buffer_bytes);
+  if (const auto warning = socket_buffer_warning(config.socket_buffer_bytes, buffers)) {
+    is_paced_ = true;
+    tell(*warning);
+  }
+  auto* factory = dds::DomainParticipantFactory::get_instance();
+  factory->load_profiles();  // else the defaults do not know FASTRTPS_DEFAULT_PROFILES_FILE
+  turn_off_intraprocess_delivery();
+  dds::DomainParticipantQos qos;
+  factory->get_default_participant_qos(qos);
+  qos.name(name);
+  set_transport(qos, config, buffers);
+  const int domain = domain_of(config);
+  participant_ = factory->create_participant(static_cast<dds::DomainId_t>(domain), qos);
+  if (participant_ == nullptr) {
+    throw std::runtime_error("cannot join DDS domain " + std::to_string(domain) +
+                             "; are its UDP ports (from 7400 + 250 x domain) free, and is there a "
+                             "network interface?");
+  }
+  publisher_ = participant_->create_publisher(dds::PUBLISHER_QOS_DEFAULT);
+  subscriber_ = participant_->create_subscriber(dds::SUBSCRIBER_QOS_DEFAULT);
+}
+
+FastNode::~FastNode() {
+  participant_->delete_contained_entities();
+  dds::DomainParticipantFactory::get_instance()->delete_participant(participant_);
+}
+
+void FastNode::tell(const Event& event) const {
+  if (sink_) {
+    sink_(event);
+  }
+}
+
+dds::Topic* FastNode::topic(const std::string& dds_type, const std::string& dds_topic) {
+  const std::lock_guard lock(topics_mutex_);
+  if (auto* known = participant_->lookup_topicdescription(dds_topic)) {
+    if (known->get_type_name() != dds_type) {
+      throw std::runtime_error("topic " + dds_topic + " is already used here with type " +
+                               known->get_type_name() + ", not " + dds_type);
+    }
+    return dynamic_cast<dds::Topic*>(known);
+  }
+  if (participant_->find_type(dds_type).empty()) {
+    dds::TypeSupport(new WireType(dds_type)).register_type(participant_);
+  }
+  dds::Topic* topic = participant_->create_topic(dds_topic, dds_type, dds::TOPIC_QOS_DEFAULT);
+  if (topic == nullptr) {
+    throw std::runtime_error("Fast DDS refuses topic " + dds_topic + " of type " + dds_type);
+  }
+  return topic;
+}
+
+std::unique_ptr<backend::Writer> FastNode::make_writer(const backend::TypeOps& type,
+                                                       const std::string& dds_topic,
+                                                       const Qos& qos,
+                                                       PublisherEvents events) {
+  return std::make_unique<FastWriter>(
+      *this, type, topic(type.dds_name, dds_topic), qos, std::move(events));
+}
+
+std::unique_ptr<backend::Reader> FastNode::make_reader(const backend::TypeOps& type,
+                                                       const std::string& dds_topic,
+                                                       const Qos& qos,
+                                                       backend::Deliver deliver,
+                                                       SubscriptionEvents events) {
+  return std::make_unique<FastReader>(
+      *this, type, topic(type.dds_name, dds_topic), qos, std::move(deliver), std::move(events));
+}
+
+}  // namespace fastdds
+
+namespace backend {
+
+std::unique_ptr<Node> make_node(const Config& config, const std::string& name, EventSink sink) {
+  return std::make_unique<fastdds::FastNode>(config, name, std::move(sink));
+}
+
+const char* name() {
+  return "fastdds";
+}
+
+}  // namespace backend
+}  // namespace trigpoint::bus

@@ -1,2 +1,136 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
+#include "fastdds_reader.hpp"
+
+#include "endpoint.hpp"
+#include "wire_type.hpp"
+
+#include <chrono>
+#include <stdexcept>
+#include <utility>
+
+namespace trigpoint::bus::fastdds {
+
+namespace dds = eprosima::fastdds::dds;
+
+namespace {
+
+Nanoseconds wall_clock_ns() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(now).count();
+}
+
+}  // namespace
+
+FastReader::FastReader(FastNode& node,
+                       const backend::TypeOps& type,
+                       dds::Topic* topic,
+                       const Qos& qos,
+                       backend::Deliver deliver,
+                       SubscriptionEvents events)
+    : node_(node),
+      type_(type),
+      topic_(topic),
+      deliver_(std::move(deliver)),
+      events_(std::move(events)),
+      message_(type.make()),
+      qos_(qos) {
+  const std::lock_guard lock(reader_mutex_);
+  reader_ = create(qos_);
+}
+
+FastReader::~FastReader() {
+  {
+    const std::lock_guard lock(callback_mutex_);
+    closed_ = true;
+  }
+  node_.worker().cancel(this);
+  remove(reader_);
+}
+
+dds::DataReader* FastReader::create(const Qos& qos) {
+  dds::DataReaderQos reader_qos;
+  set_policies(reader_qos, qos);
+  dds::DataReader* reader =
+      node_.subscriber().create_datareader(topic_, reader_qos, this, dds::StatusMask::all());
+  if (reader == nullptr) {
+    throw std::runtime_error("Fast DDS cannot create a reader on " + topic_->get_name());
+  }
+  return reader;
+}
+
+void FastReader::remove(dds::DataReader* reader) {
+  reader->set_listener(nullptr);
+  node_.subscriber().delete_datareader(reader);
+}
+
+void FastReader::on_data_available(dds::DataReader* reader) {
+  const std::lock_guard lock(callback_mutex_);
+  WireSample sample;
+  sample.ops = &type_;
+  sample.received = message_.get();
+  dds::SampleInfo info;
+  while (!closed_ && reader->take_next_sample(&sample, &info) ==
+                         eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
+    if (info.valid_data) {
+      deliver(info, sample.decoded);
+    }
+  }
+}
+
+void FastReader::deliver(const dds::SampleInfo& info, bool decoded) {
+  if (!decoded) {
+    ++malformed_;
+    return;
+  }
+  MessageInfo told;
+  told.writer_guid = guid_text(info.sample_identity.writer_guid());
+  told.source_stamp_ns = info.source_timestamp.to_ns();
+  told.reception_stamp_ns = wall_clock_ns();
+  deliver_(message_.get(), told);
+}
+
+void FastReader::on_subscription_matched(dds::DataReader*,
+                                         const dds::SubscriptionMatchedStatus& status) {
+  const std::lock_guard lock(callback_mutex_);
+  const std::string guid =
+      guid_text(eprosima::fastrtps::rtps::iHandle2GUID(status.last_publication_handle));
+  // A reader that was made anew meets the writers again; only news is told.
+  const bool matched = status.current_count_change > 0;
+  const bool is_news = matched ? writers_.insert(guid).second : writers_.erase(guid) > 0;
+  matched_ = static_cast<int>(writers_.size());
+  const auto& tell = matched ? events_.writer_matched : events_.writer_lost;
+  if (!closed_ && is_news && tell) {
+    tell(guid);
+  }
+}
+
+void FastReader::on_requested_incompatible_qos(dds::DataReader*,
+                                               const dds::RequestedIncompatibleQosStatus& status) {
+  const std::lock_guard lock(callback_mutex_);
+  if (closed_) {
+    return;
+  }
+  if (events_.incompatible_qos) {
+    events_.incompatible_qos(policy_name(status.last_policy_id));
+  }
+  if (status.last_policy_id == dds::RELIABILITY_QOS_POLICY_ID && !being_made_anew_) {
+    being_made_anew_ = true;
+    node_.worker().post(this, [this] { make_anew_as_best_effort(); });
+  }
+}
+
+void FastReader::make_anew_as_best_effort() {
+  const std::lock_guard lock(reader_mutex_);
+  remove(reader_);
+  qos_.reliability = Reliability::kBestEffort;
+  reader_ = create(qos_);
+  node_.tell({Severity::kWarning,
+              0,
+              "bus_reader_best_effort",
+              "a writer on " + topic_->get_name() +
+                  " offers only BEST_EFFORT; our reader now asks for no more, and samples that the "
+                  "network loses stay lost"});
+}
+
+}  // namespace trigpoint::bus::fastdds

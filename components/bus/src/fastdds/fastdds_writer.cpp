@@ -1,2 +1,94 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
+#include "fastdds_writer.hpp"
+
+#include "endpoint.hpp"
+#include "transport.hpp"
+#include "wire_type.hpp"
+
+#include <stdexcept>
+#include <utility>
+
+namespace trigpoint::bus::fastdds {
+
+namespace dds = eprosima::fastdds::dds;
+
+namespace {
+
+dds::DataWriterQos writer_qos(const FastNode& node, const Qos& qos) {
+  dds::DataWriterQos result;
+  set_policies(result, qos);
+  result.reliable_writer_qos().times.heartbeatPeriod =
+      eprosima::fastrtps::Duration_t(node.config().heartbeat_s);
+  result.publish_mode().kind = dds::SYNCHRONOUS_PUBLISH_MODE;
+  if (qos.bulk && node.is_paced()) {
+    result.publish_mode().kind = dds::ASYNCHRONOUS_PUBLISH_MODE;
+    result.publish_mode().flow_controller_name = kPacing;
+  }
+  return result;
+}
+
+}  // namespace
+
+FastWriter::FastWriter(FastNode& node,
+                       const backend::TypeOps& type,
+                       dds::Topic* topic,
+                       const Qos& qos,
+                       PublisherEvents events)
+    : node_(node), type_(type), events_(std::move(events)) {
+  writer_ = node.publisher().create_datawriter(
+      topic, writer_qos(node, qos), this, dds::StatusMask::all());
+  if (writer_ == nullptr) {
+    throw std::runtime_error("Fast DDS cannot create a writer on " + topic->get_name());
+  }
+}
+
+FastWriter::~FastWriter() {
+  {
+    const std::lock_guard lock(callback_mutex_);
+    closed_ = true;
+  }
+  writer_->set_listener(nullptr);
+  node_.publisher().delete_datawriter(writer_);
+}
+
+bool FastWriter::write(const void* value) {
+  WireSample sample;
+  sample.ops = &type_;
+  sample.written = value;
+  return writer_->write(&sample);
+}
+
+bool FastWriter::wait_for_acknowledgments(std::chrono::nanoseconds timeout) {
+  const eprosima::fastrtps::Duration_t limit(std::chrono::duration<double>(timeout).count());
+  return writer_->wait_for_acknowledgments(limit) ==
+         eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
+}
+
+int FastWriter::matched() const {
+  dds::PublicationMatchedStatus status;
+  writer_->get_publication_matched_status(status);
+  return status.current_count;
+}
+
+std::string FastWriter::guid() const {
+  return guid_text(writer_->guid());
+}
+
+void FastWriter::on_publication_matched(dds::DataWriter*,
+                                        const dds::PublicationMatchedStatus& status) {
+  const std::lock_guard lock(callback_mutex_);
+  if (!closed_ && events_.readers_changed) {
+    events_.readers_changed(status.current_count);
+  }
+}
+
+void FastWriter::on_offered_incompatible_qos(dds::DataWriter*,
+                                             const dds::OfferedIncompatibleQosStatus& status) {
+  const std::lock_guard lock(callback_mutex_);
+  if (!closed_ && events_.incompatible_qos) {
+    events_.incompatible_qos(policy_name(status.last_policy_id));
+  }
+}
+
+}  // namespace trigpoint::bus::fastdds

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#pragma once
+
+#include "trigpoint/bus/backend.hpp"
+
+#include "worker.hpp"
+#include <fastdds/dds/domain/DomainParticipant.hpp>
+#include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/subscriber/Subscriber.hpp>
+
+#include <mutex>
+
+namespace trigpoint::bus::fastdds {
+
+class FastNode : public backend::Node {
+ public:
+  FastNode(const Config& config, const std::string& name, EventSink sink);
+  ~FastNode() override;
+
+  std::unique_ptr<backend::Writer> make_writer(const backend::TypeOps& type,
+                                               const std::string& dds_topic,
+                                               const Qos& qos,
+                                               PublisherEvents events) override;
+  std::unique_ptr<backend::Reader> make_reader(const backend::TypeOps& type,
+                                               const std::string& dds_topic,
+                                               const Qos& qos,
+                                               backend::Deliver deliver,
+                                               SubscriptionEvents events) override;
+
+  eprosima::fastdds::dds::Publisher& publisher() { return *publisher_; }
+
+  eprosima::fastdds::dds::Subscriber& subscriber() { return *subscriber_; }
+
+  Worker& worker() { return worker_; }
+
+  const Config& config() const { return config_; }
+
+  bool is_paced() const { return is_paced_; }
+
+  void tell(const Event& event) const;
+
+ private:
+  eprosima::fastdds::dds::Topic* topic(const std::string& dds_type, const std::string& dds_topic);
+
+  const Config config_;
+  const EventSink sink_;
+  bool is_paced_{false};
+  std::mutex topics_mutex_;
+  eprosima::fastdds::dds::DomainParticipant* participant_{nullptr};
+  eprosima::fastdds::dds::Publisher* publisher_{nullptr};
+  eprosima::fastdds::dds::Subscriber* subscriber_{nullptr};
+  Worker worker_;
+};
+
+}  // namespace trigpoint::bus::fastdds

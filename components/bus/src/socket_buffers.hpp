@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// How large a socket buffer the kernel gives us, asked of the kernel itself.
+#pragma once
+
+#include "trigpoint/base/event.hpp"
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace trigpoint::bus {
+
+struct SocketBuffers {
+  std::int64_t receive_bytes{0};
+  std::int64_t send_bytes{0};
+};
+
+/// What a UDP socket gets when it asks for `wanted_bytes`, at most that.
+SocketBuffers permitted_socket_buffers(std::int64_t wanted_bytes);
+
+/// Below this, clouds are sent in paced portions: a burst of one cloud no longer fits.
+inline constexpr std::int64_t kUnpacedBufferBytes = 4'000'000;
+
+/// The warning and its remedy, when the buffers are smaller than unpaced clouds need.
+std::optional<Event> socket_buffer_warning(std::int64_t wanted_bytes, const SocketBuffers& granted);
+
+}  // namespace trigpoint::bus
