@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// Format: https://pointclouds.org/documentation/tutorials/pcd_file_format.html
+#include "pcd_writer.hpp"
+
+#include "line_file.hpp"
+
+#include <bit>
+#include <cerrno>
+#include <cstdio>
+#include <iomanip>
+#include <sstream>
+
+namespace trigpoint::exporter {
+
+static_assert(std::endian::native == std::endian::little, "PCD's binary data is little-endian");
+static_assert(sizeof(PointXyzi) == 4 * sizeof(float), "points are written as they lie in memory");
+
+namespace {
+
+/// The header is written again at the end with the true number, so it must keep its length.
+constexpr int kCountWidth = 12;
+
+}  // namespace
+
+PcdWriter::PcdWriter(const std::string& file)
+    : file_(file), part_(file + ".part"), out_(part_, std::ios::binary | std::ios::trunc) {
+  check("open for writing");
+  out_ << header();
+  check("write");
+}
+
+PcdWriter::~PcdWriter() {
+  if (!finished_) {
+    out_.close();
+    std::remove(part_.c_str());
+  }
+}
+
+std::string PcdWriter::header() const {
+  std::ostringstream text;
+  text << "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z intensity\n"
+       << "SIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\n"
+       << std::setfill('0') << "WIDTH " << std::setw(kCountWidth) << points_
+       << "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\n"
+       << "POINTS " << std::setw(kCountWidth) << points_ << "\nDATA binary\n";
+  return text.str();
+}
+
+void PcdWriter::check(const std::string& what) {
+  if (!out_) {
+    throw_errno(file_, what);
+  }
+}
+
+void PcdWriter::append(const PointCloud& points) {
+  errno = 0;
+  out_.write(reinterpret_cast<const char*>(points.data()),
+             static_cast<std::streamsize>(points.size() * sizeof(PointXyzi)));
+  check("write");
+  points_ += points.size();
+}
+
+std::uint64_t PcdWriter::finish() {
+  errno = 0;
+  out_.seekp(0);
+  out_ << header();
+  out_.close();
+  check("write");
+  if (std::rename(part_.c_str(), file_.c_str()) != 0) {
+    throw_errno(file_, "replace");
+  }
+  finished_ = true;
+  return points_;
+}
+
+}  // namespace trigpoint::exporter
