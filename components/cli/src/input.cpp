@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "input.hpp"
+
+#include "trigpoint/export/session.hpp"
+#include "trigpoint/simulator/scenario.hpp"
+#include "trigpoint/simulator/simulator.hpp"
+
+#include <filesystem>
+#include <optional>
+
+namespace trigpoint::cli {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A folder made by `trigpoint simulate`: log/, truth.tum and robot.yaml.
+bool is_simulated_drive(const fs::path& folder) {
+  return fs::is_directory(folder / "log") && fs::is_regular_file(folder / "robot.yaml");
+}
+
+/// Hands everything on and knows where the truth of a simulated drive lies.
+class WithTruth final : public recording::LogReader {
+ public:
+  WithTruth(std::unique_ptr<recording::LogReader> reader, std::string truth)
+      : reader_(std::move(reader)), truth_(std::move(truth)) {}
+
+  const recording::LogSummary& summary() const override { return reader_->summary(); }
+
+  std::optional<recording::LogEntry> next() override { return reader_->next(); }
+
+  double progress() const override { return reader_->progress(); }
+
+  std::optional<std::string> truth_file() const override { return truth_; }
+
+  std::optional<RobotConfig> robot() const override { return reader_->robot(); }
+
+ private:
+  std::unique_ptr<recording::LogReader> reader_;
+  std::string truth_;
+};
+
+/// Defaults, then what the log knows of its robot, then the user's files.
+SystemConfig configure(const InputOptions& options,
+                       const std::optional<RobotConfig>& robot,
+                       const std::vector<std::string>& overlays) {
+  SystemConfig config;
+  if (robot) {
+    config.cores.robot = *robot;
+  }
+  std::vector<std::string> files = overlays;
+  files.insert(files.end(), options.config_files.begin(), options.config_files.end());
+  load(config, files);
+  if (!options.mode.empty()) {
+    load_config_text("fusion_gate: {mode: " + options.mode + "}",
+                     "--mode",
+                     [&config](ConfigFields& fields) { describe(config, fields); });
+  }
+  if (options.duration_s > 0.0) {
+    config.log.duration_s = options.duration_s;
+  }
+  if (options.lenient) {
+    config.log.require_points = config.log.require_imu = config.log.require_fix = false;
+  }
+  return config;
+}
+
+Input open_scenario(const InputOptions& options, const std::string& truth_file) {
+  const simulator::Scenario scenario = simulator::load_scenario(options.log);
+  std::optional<double> duration_s;
+  if (options.duration_s > 0.0) {
+    duration_s = options.duration_s;
+  }
+  auto reader = simulator::open_scenario(scenario, options.seed, duration_s);
+  if (!truth_file.empty()) {
+    exporter::create_session_folder(fs::path(truth_file).parent_path().string());
+    reader->write_truth(truth_file);
+  }
+  Input input;
+  input.config = configure(options, reader->robot(), {});
+  input.reader = std::move(reader);
+  return input;
+}
+
+Input open_recording(const InputOptions& options) {
+  const fs::path path(options.log);
+  const bool simulated = is_simulated_drive(path);
+  const std::vector<std::string> overlays =
+      simulated ? std::vector<std::string>{(path / "robot.yaml").string()}
+                : std::vector<std::string>{};
+  const std::string log = simulated ? (path / "log").string() : options.log;
+  Input input;
+  input.config = configure(options, std::nullopt, overlays);
+  input.reader = recording::open_log(log, input.config.cores.robot, input.config.log);
+  if (const auto robot = input.reader->robot()) {
+    input.config = configure(options, robot, overlays);
+  }
+  if (simulated && fs::is_regular_file(path / "truth.tum")) {
+    input.reader =
+        std::make_unique<WithTruth>(std::move(input.reader), (path / "truth.tum").string());
+  }
+  return input;
+}
+
+}  // namespace
+
+void add_config_options(CLI::App& verb, InputOptions& options) {
+  verb.add_option("--config",
+                  options.config_files,
+                  "YAML with the keys to change (trigpoint config prints all); may be repeated, "
+                  "later files win");
+  verb.add_option("--mode", options.mode, "of the gate: lio, fusion, literal or hard");
+}
+
+void add_input_options(CLI::App& verb, InputOptions& options) {
+  verb.add_option("LOG",
+                  options.log,
+                  "ROS 1 bag, rosbag2 folder, KITTI raw drive folder, folder made by trigpoint "
+                  "simulate, or a scenario (name or .yaml), which is streamed")
+      ->required();
+  add_config_options(verb, options);
+  verb.add_option("--seed", options.seed, "of the world and the noise, when LOG is a scenario")
+      ->capture_default_str();
+  verb.add_option("--duration", options.duration_s, "use only this much of the log, s");
+}
+
+Input open_input(const InputOptions& options, const std::string& truth_file) {
+  const bool recorded = fs::exists(options.log) && fs::path(options.log).extension() != ".yaml";
+  return !recorded && simulator::is_scenario(options.log) ? open_scenario(options, truth_file)
+                                                          : open_recording(options);
+}
+
+SystemConfig load_config_of(const InputOptions& options) {
+  return configure(options, std::nullopt, {});
+}
+
+}  // namespace trigpoint::cli

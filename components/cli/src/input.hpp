@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#pragma once
+
+#include "trigpoint/recording/log.hpp"
+
+#include "system_config.hpp"
+#include "verbs.hpp"
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace trigpoint::cli {
+
+struct InputOptions {
+  std::string log;  ///< bag, rosbag2, KITTI drive, simulated drive's folder, or scenario
+  std::vector<std::string> config_files;
+  std::string mode;  ///< of the gate; empty: the configuration's
+  std::uint64_t seed{1};
+  double duration_s{0.0};  ///< 0: all
+  bool lenient{false};     ///< a log that lacks a topic is opened all the same
+};
+
+/// A log that is open, and the configuration that goes with it: the user's files over what the log
+/// itself knows of its robot over the defaults.
+struct Input {
+  std::unique_ptr<recording::LogReader> reader;
+  SystemConfig config;
+};
+
+/// The arguments LOG, --config, --mode, --seed and --duration.
+void add_input_options(CLI::App& verb, InputOptions& options);
+
+/// Only --config and --mode.
+void add_config_options(CLI::App& verb, InputOptions& options);
+
+/// Throws LogError, ConfigError. A scenario is streamed without being written; its truth goes to
+/// `truth_file` (for scoring only) unless that is empty.
+Input open_input(const InputOptions& options, const std::string& truth_file = {});
+
+/// The configuration alone, without a log.
+SystemConfig load_config_of(const InputOptions& options);
+
+}  // namespace trigpoint::cli

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "progress.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace trigpoint::cli {
+
+namespace {
+constexpr int kWidth = 40;
+}
+
+Progress::Progress(std::string what)
+    : what_(std::move(what)),
+      terminal_(isatty(STDERR_FILENO) == 1),
+      start_(std::chrono::steady_clock::now()) {}
+
+Progress::~Progress() {
+  if (terminal_ && shown_ >= 0.0) {
+    std::fputc('\n', stderr);
+  }
+}
+
+void Progress::operator()(double share) {
+  share = std::clamp(share, 0.0, 1.0);
+  const double step = terminal_ ? 0.005 : 0.1;
+  if (share < shown_ + step && !(share >= 1.0 && shown_ < 1.0)) {
+    return;
+  }
+  shown_ = share;
+  draw(share, std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count());
+}
+
+void Progress::draw(double share, double elapsed_s) const {
+  const auto filled = static_cast<std::size_t>(std::lround(share * kWidth));
+  const std::string bar = std::string(filled, '#') + std::string(kWidth - filled, '.');
+  const double left_s = share > 0.0 ? elapsed_s * (1.0 - share) / share : 0.0;
+  std::fprintf(stderr,
+               "%s%s [%s] %3.0f %%  %.0f s, %.0f s to go%s",
+               terminal_ ? "\r" : "",
+               what_.c_str(),
+               bar.c_str(),
+               100.0 * share,
+               elapsed_s,
+               left_s,
+               terminal_ ? "   " : "\n");
+  std::fflush(stderr);
+}
+
+}  // namespace trigpoint::cli

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "trigpoint/shell/shell.hpp"
+
+#include "bus_survey.hpp"
+#include "input.hpp"
+#include "measurement_checks.hpp"
+#include "progress.hpp"
+#include "verbs.hpp"
+
+#include <fstream>
+#include <iomanip>
+#include <iostream>
+#include <memory>
+#include <variant>
+
+namespace trigpoint::cli {
+
+namespace {
+
+constexpr std::int64_t kWantedSocketBuffer_bytes = 4'194'304;
+
+struct DoctorOptions {
+  InputOptions input;
+  double seconds{5.0};
+};
+
+/// 0 when nothing is wrong.
+int tell(const std::string& topic, const std::vector<std::string>& remarks) {
+  for (const std::string& remark : remarks) {
+    std::cout << "  ! " << topic << ": " << remark << "\n";
+  }
+  return remarks.empty() ? 0 : 1;
+}
+
+void tell_socket_buffer_limit() {
+  std::ifstream file("/proc/sys/net/core/rmem_max");
+  std::int64_t limit = 0;
+  if (file >> limit && limit < kWantedSocketBuffer_bytes) {
+    std::cout << "  ! socket buffers are limited to " << limit
+              << " bytes: clouds will be paced and repaired; better: sysctl -w net.core.rmem_max="
+              << kWantedSocketBuffer_bytes << "\n";
+  }
+}
+
+int examine_bus(const DoctorOptions& options) {
+  const shell::EventLog log("doctor");
+  const SystemConfig config = load_config_of(options.input);
+  std::cout << "DDS domain " << bus::domain_of(config.bus) << ", listening for " << options.seconds
+            << " s\n";
+  const auto surveys = recording::survey_bus({config.bus,
+                                              recording::known_topics(config.cores.robot),
+                                              options.seconds,
+                                              [&log](const Event& event) { log(event); }});
+  int wrong = 0;
+  bool anybody = false;
+  for (const recording::TopicSurvey& survey : surveys) {
+    const std::size_t writers = survey.writers.size() + survey.silent_writers.size();
+    anybody = anybody || writers > 0;
+    std::cout << std::left << std::setw(24) << survey.topic.name << std::setw(34)
+              << survey.topic.ros_type << std::right << std::setw(3) << writers
+              << (writers == 1 ? " writer  " : " writers ") << std::setw(7) << survey.messages
+              << " messages " << std::fixed << std::setprecision(1) << std::setw(7)
+              << survey.rate_hz << " Hz\n";
+    wrong |= tell(survey.topic.name, survey.remarks);
+    for (const std::string& policy : survey.refused) {
+      wrong |= tell(survey.topic.name, {"a writer offers less than we ask for (" + policy + ")"});
+    }
+  }
+  tell_socket_buffer_limit();
+  if (!anybody) {
+    std::cerr << "trigpoint doctor: nobody writes any of these topics; is ROS_DOMAIN_ID the same "
+                 "everywhere?\n";
+    return 1;
+  }
+  return wrong;
+}
+
+int examine_log(const DoctorOptions& options) {
+  Input input = open_input(options.input);
+  recording::MeasurementChecks points;
+  recording::MeasurementChecks imu;
+  recording::MeasurementChecks fixes;
+  Progress progress("examining");
+  int wrong = 0;
+  try {
+    while (const auto entry = input.reader->next()) {
+      progress(input.reader->progress());
+      if (const auto* sample = std::get_if<ImuSample>(&entry->measurement)) {
+        imu.take(*sample);
+      } else if (const auto* fix = std::get_if<GnssFix>(&entry->measurement)) {
+        fixes.take(*fix);
+      } else {
+        points.take(std::get<PointCloudMessage>(entry->measurement));
+      }
+    }
+  } catch (const recording::LogError& broken) {
+    std::cout << "  ! the log breaks off: " << broken.what() << "\n";
+    wrong = 1;
+  }
+  const RobotConfig& robot = input.config.cores.robot;
+  wrong |= tell(robot.points_topic, points.remarks()) | tell(robot.imu_topic, imu.remarks()) |
+           tell(robot.fix_topic, fixes.remarks());
+  std::cout << (wrong == 0 ? "nothing wrong found\n" : "");
+  return wrong;
+}
+
+}  // namespace
+
+void add_doctor(CLI::App& app, Chosen& chosen) {
+  CLI::App* verb = app.add_subcommand("doctor",
+                                      "Tell what is on the bus (or in LOG), what is missing, and "
+                                      "which unit, frame or QoS is wrong");
+  const auto options = std::make_shared<DoctorOptions>();
+  verb->add_option("LOG", options->input.log, "examine this log instead of the bus");
+  add_config_options(*verb, options->input);
+  verb->add_option("--seconds", options->seconds, "listen to the bus for this long")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
+  verb->footer("Exit code 0: nothing wrong found; 1: see the lines with '!'.");
+  verb->callback([options, &chosen] {
+    chosen = [options] {
+      return options->input.log.empty() ? examine_bus(*options) : examine_log(*options);
+    };
+  });
+}
+
+}  // namespace trigpoint::cli

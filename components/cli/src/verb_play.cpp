@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "trigpoint/export/session.hpp"
+#include "trigpoint/pipeline/session_parts.hpp"
+#include "trigpoint/shell/shell.hpp"
+#include "trigpoint/shell/stop_signal.hpp"
+
+#include "input.hpp"
+#include "player.hpp"
+#include "progress.hpp"
+#include "verbs.hpp"
+
+#include <chrono>
+#include <iostream>
+#include <memory>
+#include <optional>
+
+namespace trigpoint::cli {
+
+namespace {
+
+struct PlayVerbOptions {
+  InputOptions input;
+  std::string session;
+  std::string rate{"max"};
+  int wait_s{10};
+};
+
+double rate_of(const std::string& text) {
+  if (text == "max") {
+    return 0.0;
+  }
+  std::size_t used = 0;
+  double rate = 0.0;
+  try {
+    rate = std::stod(text, &used);
+  } catch (const std::exception&) {
+    used = 0;
+  }
+  if (used != text.size() || !(rate > 0.0)) {
+    throw ConfigError("--rate must be 'max' or a number above 0 (1 is real time); is '" + text +
+                      "'");
+  }
+  return rate;
+}
+
+/// The player's part of the session; nothing without a folder.
+class SessionPart {
+ public:
+  SessionPart(const std::string& folder, const shell::EventLog& log) : folder_(folder), disk_(log) {
+    if (!folder.empty()) {
+      exporter::create_session_folder(folder);
+      part_.emplace(folder);
+    }
+  }
+
+  void on_entry(const recording::LogEntry& entry) {
+    if (part_) {
+      disk_.keep([&] { part_->on_entry(entry); });
+    }
+  }
+
+  void close(const recording::LogReader& reader, const SystemConfig& config, double wall_s) {
+    if (!part_) {
+      return;
+    }
+    disk_.keep([&] {
+      namespace file = exporter::session_file;
+      part_->close();
+      exporter::write_run(exporter::path_in(folder_, file::kRun),
+                          {reader.summary().path,
+                           "dds",
+                           mode_of(config),
+                           "ekf15",
+                           to_seconds(part_->last_ns() - part_->first_ns()),
+                           wall_s});
+      const auto truth = reader.truth_file();
+      if (truth && *truth != exporter::path_in(folder_, file::kTruth)) {
+        exporter::copy_file(*truth, exporter::path_in(folder_, file::kTruth));
+      }
+    });
+  }
+
+  bool failed() const { return disk_.failed(); }
+
+ private:
+  std::string folder_;
+  shell::DiskGuard disk_;
+  std::optional<pipeline::LogPart> part_;
+};
+
+int run(const PlayVerbOptions& options) {
+  const shell::StopSignal stop;
+  const shell::EventLog log("play");
+  const std::string truth =
+      options.session.empty() ? ""
+                              : exporter::path_in(options.session, exporter::session_file::kTruth);
+  Input input = open_input(options.input, truth);
+  SessionPart session(options.session, log);
+  Progress progress("playing");
+  recording::PlayOptions play;
+  play.robot = input.config.cores.robot;
+  play.bus = input.config.bus;
+  play.rate = rate_of(options.rate);
+  play.wait_for_peers = std::chrono::seconds(options.wait_s);
+  play.progress = [&](double share) { progress(share); };
+  play.on_entry = [&](const recording::LogEntry& entry) { session.on_entry(entry); };
+  play.on_event = [&](const Event& event) { log(event); };
+  play.stop = [&] { return stop.requested(); };
+  const auto start = std::chrono::steady_clock::now();
+  const recording::PlayResult result = recording::play(*input.reader, play);
+  const double wall_s =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  session.close(*input.reader, input.config, wall_s);
+  std::cout << "played " << result.sweeps << " sweeps, " << result.imu << " IMU samples, "
+            << result.fixes << " fixes in " << wall_s << " s; " << result.unanswered
+            << " waits for an answer were given up\n";
+  if (!result.log_error.empty()) {
+    std::cerr << "trigpoint play: the log breaks off: " << result.log_error << "\n";
+  }
+  return result.log_error.empty() && !result.stopped && !session.failed() ? 0 : 1;
+}
+
+}  // namespace
+
+void add_play(CLI::App& app, Chosen& chosen) {
+  CLI::App* verb =
+      app.add_subcommand("play", "Publish a log (or a simulated drive) and its clock on the bus");
+  const auto options = std::make_shared<PlayVerbOptions>();
+  add_input_options(*verb, options->input);
+  verb->add_option("--rate",
+                   options->rate,
+                   "1 is real time; 'max': as fast as mapper and filter take it, dropping nothing")
+      ->capture_default_str();
+  verb->add_option("--session",
+                   options->session,
+                   "folder for the player's part of the results (fixes, counts, truth)");
+  verb->add_option("--wait",
+                   options->wait_s,
+                   "wait this long for the three processes before the first message, s")
+      ->capture_default_str();
+  verb->callback([options, &chosen] { chosen = [options] { return run(*options); }; });
+}
+
+}  // namespace trigpoint::cli

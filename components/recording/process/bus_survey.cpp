@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "bus_survey.hpp"
+
+#include "trigpoint/bus/bus.hpp"
+#include "trigpoint/bus/cdr.hpp"
+#include "trigpoint/bus/loop.hpp"
+
+#include "measurement_checks.hpp"
+
+#include <chrono>
+#include <map>
+#include <memory>
+
+namespace trigpoint::recording {
+
+namespace {
+
+/// One subscription and what it has heard; changed on the loop's thread only.
+class Listener {
+ public:
+  Listener(bus::Participant& participant, bus::Loop& loop, const KnownTopic& topic)
+      : subscription_(participant,
+                      topic.name,
+                      topic.ros_type,
+                      topic.qos,
+                      [this, &loop](bus::SerializedMessage& cdr, const bus::MessageInfo& info) {
+                        loop.post(
+                            [this, bytes = std::move(cdr), writer = info.writer_guid] {
+                              take(bytes, writer);
+                            },
+                            bus::WhenFull::kDropOldest);
+                      },
+                      {[this, &loop](const std::string& writer) {
+                         loop.post([this, writer] { matched_.insert(writer); });
+                       },
+                       {},
+                       [this, &loop](const std::string& policy) {
+                         loop.post([this, policy] { survey_.refused.insert(policy); });
+                       }}) {
+    survey_.topic = topic;
+  }
+
+  TopicSurvey result(double duration_s) {
+    survey_.rate_hz = static_cast<double>(survey_.messages) / duration_s;
+    for (const std::string& writer : matched_) {
+      if (!survey_.writers.contains(writer)) {
+        survey_.silent_writers.insert(writer);
+      }
+    }
+    survey_.remarks = checks_.remarks();
+    return survey_;
+  }
+
+ private:
+  void take(const bus::SerializedMessage& bytes, const std::string& writer) {
+    ++survey_.messages;
+    survey_.bytes += bytes.size();
+    survey_.writers.insert(writer);
+    check<ImuSample>(bytes) || check<GnssFix>(bytes) || check<PointCloudMessage>(bytes);
+  }
+
+  template <typename Plain>
+  bool check(const bus::SerializedMessage& bytes) {
+    if (survey_.topic.ros_type != bus::ros_type_name<Plain>()) {
+      return false;
+    }
+    Plain value;
+    if (bus::decode_cdr(bytes, value)) {
+      checks_.take(value);
+    } else {
+      checks_.note("a message could not be decoded as " + survey_.topic.ros_type);
+    }
+    return true;
+  }
+
+  TopicSurvey survey_;
+  std::set<std::string> matched_;
+  MeasurementChecks checks_;
+  bus::SerializedSubscription subscription_;
+};
+
+}  // namespace
+
+std::vector<TopicSurvey> survey_bus(const SurveyOptions& options) {
+  bus::Loop loop;
+  bus::Participant participant(options.bus, "doctor", options.on_event);
+  std::vector<std::unique_ptr<Listener>> listeners;
+  for (const KnownTopic& topic : options.topics) {
+    listeners.push_back(std::make_unique<Listener>(participant, loop, topic));
+  }
+  loop.every(std::chrono::nanoseconds(from_seconds(options.duration_s)), [&loop] { loop.stop(); });
+  loop.run();
+  std::vector<TopicSurvey> surveys;
+  for (const auto& listener : listeners) {
+    surveys.push_back(listener->result(options.duration_s));
+  }
+  return surveys;
+}
+
+}  // namespace trigpoint::recording

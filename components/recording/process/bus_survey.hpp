@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// Listens to the bus for a while and tells who says what.
+#pragma once
+
+#include "trigpoint/base/event.hpp"
+#include "trigpoint/bus/config.hpp"
+
+#include "known_topics.hpp"
+
+#include <cstdint>
+#include <functional>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace trigpoint::recording {
+
+struct TopicSurvey {
+  KnownTopic topic;
+  std::uint64_t messages{0};
+  double rate_hz{0.0};
+  std::uint64_t bytes{0};
+  std::set<std::string> writers;         ///< GUIDs of those who were heard
+  std::set<std::string> silent_writers;  ///< matched, but nothing came from them
+  std::set<std::string> refused;         ///< QoS policies for which a writer did not match
+  std::vector<std::string> remarks;      ///< wrong units, missing fields, frames: sentences
+};
+
+struct SurveyOptions {
+  bus::Config bus;
+  std::vector<KnownTopic> topics;
+  double duration_s{5.0};
+  std::function<void(const Event&)> on_event;  ///< may be empty
+};
+
+/// Joins the bus, listens, leaves. Ends early on SIGINT or SIGTERM. Throws std::runtime_error when
+/// the bus cannot be joined.
+std::vector<TopicSurvey> survey_bus(const SurveyOptions& options);
+
+}  // namespace trigpoint::recording

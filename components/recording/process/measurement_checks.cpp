@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "measurement_checks.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+
+namespace trigpoint::recording {
+
+namespace {
+
+constexpr double kGravity_mps2 = 9.81;
+constexpr double kGravityTolerance_mps2 = 2.0;
+constexpr double kFastestRobot_radps = 12.0;  ///< more is most likely degrees per second
+constexpr std::uint64_t kEnoughImuSamples = 50;
+
+std::string number(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.3g", value);
+  return text.data();
+}
+
+bool has_field(const PointCloudMessage& cloud, const std::vector<std::string>& names) {
+  return std::any_of(cloud.fields.begin(), cloud.fields.end(), [&names](const PointField& field) {
+    return std::find(names.begin(), names.end(), field.name) != names.end();
+  });
+}
+
+}  // namespace
+
+void MeasurementChecks::take(const ImuSample& sample) {
+  check_stamp(sample.stamp_ns, sample.frame_id);
+  ++imu_samples_;
+  accel_sum_mps2_ += sample.accel_mps2.norm();
+  accel_z_sum_mps2_ += sample.accel_mps2.z();
+  gyro_peak_radps_ = std::max(gyro_peak_radps_, sample.gyro_radps.cwiseAbs().maxCoeff());
+}
+
+void MeasurementChecks::take(const GnssFix& fix) {
+  check_stamp(fix.stamp_ns, fix.frame_id);
+  if (fix.status == FixStatus::kNoFix) {
+    note("no fix (status -1)");
+  }
+  if (fix.latitude_deg == 0.0 && fix.longitude_deg == 0.0) {
+    note("latitude and longitude are exactly 0: the receiver has no position");
+  }
+  if (fix.covariance_type == CovarianceType::kUnknown || fix.covariance_enu_m2.trace() <= 0.0) {
+    note("the fix says nothing of its covariance: a class default is assumed");
+  }
+}
+
+void MeasurementChecks::take(const PointCloudMessage& cloud) {
+  check_stamp(cloud.stamp_ns, cloud.frame_id);
+  if (cloud.width == 0 || cloud.height == 0) {
+    note("an empty cloud");
+  } else if (!has_field(cloud, {"x"}) || !has_field(cloud, {"y"}) || !has_field(cloud, {"z"})) {
+    note("the cloud lacks a field x, y or z");
+  } else if (!has_field(cloud, {"time", "t", "timestamp", "time_stamp", "offset_time"})) {
+    note(
+        "the points carry no time (no field time, t or timestamp): set lio_mapper.sweep.point_time "
+        "to azimuth or snapshot");
+  }
+}
+
+void MeasurementChecks::note(const std::string& sentence) {
+  ++notes_[sentence];
+}
+
+std::vector<std::string> MeasurementChecks::remarks() const {
+  std::vector<std::string> all;
+  for (const auto& [sentence, count] : notes_) {
+    all.push_back(sentence + " (" + std::to_string(count) + " times)");
+  }
+  if (imu_samples_ < kEnoughImuSamples) {
+    return all;
+  }
+  const auto samples = static_cast<double>(imu_samples_);
+  const double mean_mps2 = accel_sum_mps2_ / samples;
+  if (mean_mps2 > 0.8 && mean_mps2 < 1.2) {
+    all.push_back("acceleration has a mean of " + number(mean_mps2) +
+                  ": it is in g; m/s^2 is expected");
+  } else if (std::abs(mean_mps2 - kGravity_mps2) > kGravityTolerance_mps2) {
+    all.push_back("acceleration has a mean of " + number(mean_mps2) +
+                  " m/s^2; about 9.81, gravity included, is expected");
+  } else if (accel_z_sum_mps2_ < 0.0) {
+    all.push_back("acceleration along z is " + number(accel_z_sum_mps2_ / samples) +
+                  " m/s^2: +9.81 at rest is expected; is the IMU upside down "
+                  "(robot.imu_roll_pitch_yaw_base_rad)?");
+  }
+  if (gyro_peak_radps_ > kFastestRobot_radps) {
+    all.push_back("angular rate peaks at " + number(gyro_peak_radps_) +
+                  ": is it in degrees per second? rad/s is expected");
+  }
+  return all;
+}
+
+void MeasurementChecks::check_stamp(Nanoseconds stamp_ns, const std::string& frame_id) {
+  if (stamp_ns <= 0) {
+    note("a stamp of 0");
+  } else if (stamp_ns < newest_ns_) {
+    note("a stamp that goes back");
+  }
+  newest_ns_ = std::max(newest_ns_, stamp_ns);
+  if (frame_id.empty()) {
+    note("an empty frame_id");
+  }
+}
+
+}  // namespace trigpoint::recording

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#pragma once
+
+#include "trigpoint/base/measurements.hpp"
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace trigpoint::recording {
+
+/// Looks at measurements as they come and remembers what would keep the filters from using them:
+/// units, frames, missing fields, stamps that go back.
+class MeasurementChecks {
+ public:
+  void take(const ImuSample& sample);
+  void take(const GnssFix& fix);
+  void take(const PointCloudMessage& cloud);
+  void note(const std::string& sentence);
+
+  /// Sentences with the numbers and what to do, each with how often it was seen.
+  std::vector<std::string> remarks() const;
+
+ private:
+  void check_stamp(Nanoseconds stamp_ns, const std::string& frame_id);
+
+  std::map<std::string, std::uint64_t> notes_;
+  Nanoseconds newest_ns_{0};
+  std::uint64_t imu_samples_{0};
+  double accel_sum_mps2_{0.0};
+  double accel_z_sum_mps2_{0.0};
+  double gyro_peak_radps_{0.0};
+};
+
+}  // namespace trigpoint::recording

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "recorder.hpp"
+
+#include "trigpoint/bus/bus.hpp"
+#include "trigpoint/bus/loop.hpp"
+#include "trigpoint/recording/rosbag2_writer.hpp"
+
+#include <chrono>
+#include <map>
+#include <memory>
+
+namespace trigpoint::recording {
+
+namespace {
+
+std::vector<TopicSummary> summarize(const std::map<std::string, TopicSummary>& counts) {
+  std::vector<TopicSummary> topics;
+  for (const auto& [name, summary] : counts) {
+    topics.push_back(summary);
+  }
+  return topics;
+}
+
+}  // namespace
+
+RecordResult record(const RecordOptions& options) {
+  bus::Loop loop;
+  Rosbag2Writer writer(options.out);
+  std::map<std::string, TopicSummary> counts;
+  bus::Participant participant(options.bus, "recorder", options.on_event);
+  std::vector<std::unique_ptr<bus::SerializedSubscription>> subscriptions;
+  for (const KnownTopic& topic : options.topics) {
+    subscriptions.push_back(std::make_unique<bus::SerializedSubscription>(
+        participant,
+        topic.name,
+        topic.ros_type,
+        topic.qos,
+        [&loop, &writer, &counts, topic](bus::SerializedMessage& cdr,
+                                         const bus::MessageInfo& info) {
+          loop.post(
+              [&writer,
+               &counts,
+               topic,
+               bytes = std::move(cdr),
+               received_ns = info.reception_stamp_ns] {
+                writer.write_cdr(topic.name, topic.ros_type, received_ns, bytes);
+                TopicSummary& summary = counts[topic.name];
+                summary.topic = topic.name;
+                summary.type = topic.ros_type;
+                ++summary.messages;
+              },
+              bus::WhenFull::kDropOldest);
+        }));
+  }
+  if (options.duration_s > 0.0) {
+    loop.every(std::chrono::nanoseconds(from_seconds(options.duration_s)),
+               [&loop] { loop.stop(); });
+  }
+  if (options.progress) {
+    loop.every(std::chrono::seconds(1), [&] { options.progress(summarize(counts)); });
+  }
+  loop.run();
+  subscriptions.clear();
+  writer.close();
+  return {summarize(counts), loop.dropped()};
+}
+
+}  // namespace trigpoint::recording
