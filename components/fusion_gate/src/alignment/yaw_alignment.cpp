@@ -8,12 +8,12 @@
 
 #include "trigpoint/base/so3.hpp"
 
+#include "sentence.hpp"
 #include <Eigen/Cholesky>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 
 namespace trigpoint::fusion_gate {
@@ -218,12 +218,6 @@ double outlier_share_of(const RobustWeights& weights) {
   const auto outliers =
       (weights.horizontal.array().min(weights.vertical.array()) < kOutlierWeight).count();
   return static_cast<double>(outliers) / static_cast<double>(weights.horizontal.size());
-}
-
-std::string sentence(const char* format, double value, double limit) {
-  std::array<char, 128> text{};
-  std::snprintf(text.data(), text.size(), format, value, limit);
-  return text.data();
 }
 
 }  // namespace

@@ -2,8 +2,7 @@
 // Copyright the Trigpoint developers
 #include "checks/accepted_fix.hpp"
 
-#include <array>
-#include <cstdio>
+#include "sentence.hpp"
 
 namespace trigpoint::fusion_gate {
 
@@ -58,10 +57,7 @@ std::optional<Refusal> check_age(const AcceptedFix& fix,
   if (age_s <= max_age_s) {
     return std::nullopt;
   }
-  std::array<char, 96> text{};
-  std::snprintf(
-      text.data(), text.size(), "fix is %.2f s behind LIO, limit %.2f s", age_s, max_age_s);
-  return Refusal{"late", text.data()};
+  return Refusal{"late", sentence("fix is %.2f s behind LIO, limit %.2f s", age_s, max_age_s)};
 }
 
 }  // namespace trigpoint::fusion_gate

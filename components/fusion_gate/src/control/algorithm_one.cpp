@@ -2,23 +2,13 @@
 // Copyright the Trigpoint developers
 #include "control/algorithm_one.hpp"
 
+#include "sentence.hpp"
+
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <cstdio>
 
 namespace trigpoint::fusion_gate {
-
-namespace {
-
-std::string compare_text(double sigma_m, const char* relation, double threshold_m) {
-  std::array<char, 96> text{};
-  std::snprintf(
-      text.data(), text.size(), "sigma %.2f m %s threshold %.2f m", sigma_m, relation, threshold_m);
-  return text.data();
-}
-
-}  // namespace
 
 Mode mode_of(const std::string& text) {
   if (text == "lio") {
@@ -40,9 +30,15 @@ AxisChoice algorithm_one(double variance_m2, double threshold_m) {
     return {AxisDecision::kLio, kNaN, threshold_m, "sigma of the GPS odometry is not known"};
   }
   if (sigma_m > threshold_m) {
-    return {AxisDecision::kLio, sigma_m, threshold_m, compare_text(sigma_m, ">", threshold_m)};
+    return {AxisDecision::kLio,
+            sigma_m,
+            threshold_m,
+            sentence("sigma %.2f m > threshold %.2f m", sigma_m, threshold_m)};
   }
-  return {AxisDecision::kFused, sigma_m, threshold_m, compare_text(sigma_m, "<=", threshold_m)};
+  return {AxisDecision::kFused,
+          sigma_m,
+          threshold_m,
+          sentence("sigma %.2f m <= threshold %.2f m", sigma_m, threshold_m)};
 }
 
 Eigen::Vector3d threshold_sigma_m(const Config& config) {

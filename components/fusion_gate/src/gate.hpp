@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#pragma once
+
+#include "trigpoint/fusion_gate/fusion_gate.hpp"
+#include "trigpoint/geodesy/local_frame.hpp"
+
+#include "alignment/alignment_window.hpp"
+#include "alignment/pose_buffer.hpp"
+#include "checks/accepted_fix.hpp"
+#include "checks/foreign_source.hpp"
+#include "checks/gps_sources.hpp"
+#include "checks/verdicts.hpp"
+#include "control/algorithm_one.hpp"
+#include "fusion/rows.hpp"
+
+#include <algorithm>
+#include <deque>
+#include <map>
+#include <optional>
+#include <string>
+
+namespace trigpoint::fusion_gate {
+
+/// The gate's state and its flow; one file a theme: gate_gps (sources, verdicts), gate_alignment
+/// (pairs, rows, LIO's epochs), gate_output (map and status).
+struct FusionGate::Impl {
+  Impl(const Config& config_in, const RobotConfig& robot_in);
+  // --- GPS in
+  void take_gps_odometry(const Odometry& odometry, const std::string& writer, Output& out);
+  void take_gps_status(const GpsStatus& status, const std::string& writer, Output& out);
+  void take_raw_fix(const GnssFix& fix, Output& out);
+  void note_refusals_of_filter(const GpsStatus& status, const std::optional<GpsStatus>& before);
+  void judge(const AcceptedFix& fix, const std::optional<Refusal>& refusal, Output& out);
+  void accept(const AcceptedFix& fix, Output& out);
+  void follow_healthiest(Output& out);
+  ForeignSource& foreign(const std::string& writer);
+
+  // --- alignment and rows
+  void align_pending(Output& out);
+  void add_pair(const AcceptedFix& fix, const PoseBuffer::Sample& at_fix, Output& out);
+  void make_rows(const AcceptedFix& fix, Output& out);
+  std::optional<Alignment> best_alignment() const;
+
+  bool aligned() const { return lio && lio->aligned; }
+
+  // --- LIO in
+  void take_lio_status(const LioStatus& status, Output& out);
+  void begin_epoch(const LioStatus& status, Output& out);
+
+  // --- map out
+  bool lio_carries() const;
+  bool gps_carries() const;
+  std::optional<Odometry> gps_in_map() const;
+  Eigen::Vector3d gps_variance_m2() const;
+  void publish_lio(const Odometry& odometry, Output& out);
+  void publish_gps(Output& out);
+  void publish(const Odometry& odometry, Output& out);
+
+  // --- status
+  FusionStatus status() const;
+  AxisStatus axis_status(const AxisChoice& choice) const;
+  std::optional<std::string> missing_fix() const;
+  void finish(Output& out, bool status_wanted);
+
+  void advance(Nanoseconds stamp_ns) { now_ns = std::max(now_ns, stamp_ns); }
+
+  void tell(Output& out, Severity severity, const char* code, const std::string& text) const {
+    out.events.push_back({severity, now_ns, code, text});
+  }
+
+  std::string datum_id() const { return frame ? frame->datum().id() : std::string(); }
+
+  Config config;
+  RobotConfig robot;
+  Mode mode;
+  Eigen::Vector3d threshold_m;
+  GpsSources sources;
+  Verdicts verdicts;
+  RowMaker rows;
+  PoseBuffer lio_poses;
+  AlignmentWindow window;
+  std::deque<AcceptedFix> pending;  // accepted, waiting for LIO to cover their stamps
+  std::map<std::string, ForeignSource> foreign_sources;
+  std::optional<geodesy::LocalFrame> frame;
+  std::optional<LioStatus> lio;
+
+  Nanoseconds now_ns{0};  // data time: the newest stamp of any odometry or status
+  std::optional<Nanoseconds> first_gps_ns;
+  std::optional<Nanoseconds> last_lio_ns;
+  std::optional<Nanoseconds> last_imu_rate_ns;
+  std::optional<Nanoseconds> last_fused_ns;
+  std::optional<Nanoseconds> last_status_ns;
+  std::optional<Nanoseconds> last_accepted_ns;
+  std::deque<double> fix_intervals_s;
+  std::uint64_t fixes_seen{0};
+  bool verdict_changed{false};
+};
+
+}  // namespace trigpoint::fusion_gate

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "gate.hpp"
+#include "sentence.hpp"
+
+#include <algorithm>
+#include <numbers>
+
+namespace trigpoint::fusion_gate {
+
+namespace {
+
+constexpr double kDegrees = 180.0 / std::numbers::pi;
+
+}  // namespace
+
+void FusionGate::Impl::align_pending(Output& out) {
+  while (!pending.empty()) {
+    const AcceptedFix fix = pending.front();
+    const PoseBuffer::Answer answer = lio_poses.at(fix.stamp_ns);
+    if (answer.coverage == PoseBuffer::Coverage::kNotYet) {
+      return;
+    }
+    pending.pop_front();
+    verdict_changed = true;
+    if (answer.coverage == PoseBuffer::Coverage::kCovered) {
+      add_pair(fix, answer.sample, out);
+    } else {
+      verdicts.record(fix.stamp_ns,
+                      false,
+                      "no_lio_pose",
+                      "not aligned yet, and no LIO pose at the fix's stamp");
+    }
+  }
+}
+
+void FusionGate::Impl::add_pair(const AcceptedFix& fix,
+                                const PoseBuffer::Sample& at_fix,
+                                Output& out) {
+  const bool was_admitted = window.admitted();
+  const Eigen::Vector3d antenna_odom_m = at_fix.T_frame_child * robot.antenna_position_base_m;
+  const Eigen::Vector3d variance_m2 = floored(fix.covariance_map_m2, config.min_sigma_m).diagonal();
+  const bool added =
+      window.add({fix.stamp_ns, fix.antenna_map_m, variance_m2, antenna_odom_m, at_fix.distance_m});
+  if (!window.admitted()) {
+    const std::string why = window.obstacle().value_or("no solution");
+    verdicts.record(fix.stamp_ns,
+                    added,
+                    added ? "alignment" : "alignment_redundant",
+                    (added ? "taken for the alignment, not admitted yet: "
+                           : "too near to the last pair; alignment not admitted yet: ") +
+                        why);
+    return;
+  }
+  const Alignment alignment{
+      lio ? lio->odom_epoch : 0, window.solution()->T_map_odom, window.solution()->covariance};
+  out.state_updates.push_back(rows.make_alignment(fix, alignment));
+  verdicts.record(fix.stamp_ns, true, "alignment", "carries the first alignment");
+  if (!was_admitted) {
+    tell(out,
+         Severity::kInfo,
+         "alignment_admitted",
+         sentence("odom is aligned with map: yaw %.2f deg, sigma %.2f deg",
+                  alignment.T_map_odom.yaw_rad * kDegrees,
+                  window.solution()->yaw_sigma_rad() * kDegrees));
+  }
+}
+
+void FusionGate::Impl::make_rows(const AcceptedFix& fix, Output& out) {
+  const AxisChoices choices = choose_axes(mode, gps_variance_m2(), threshold_m);
+  verdict_changed = true;
+  if (mode == Mode::kLio) {
+    verdicts.record(fix.stamp_ns, false, "mode_lio", "mode lio takes no GPS rows");
+    return;
+  }
+  const bool used = any_fused(choices);
+  out.state_updates.push_back(rows.make(fix, choices));
+  std::string reason = used ? "rows:" : "no row:";
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    reason += std::string(axis == 0   ? " east "
+                          : axis == 1 ? ", north "
+                                      : ", up ") +
+              choices[axis].reason;
+  }
+  const bool all = std::all_of(choices.begin(), choices.end(), [](const AxisChoice& c) {
+    return c.decision == AxisDecision::kFused;
+  });
+  verdicts.record(fix.stamp_ns,
+                  used,
+                  all    ? "used"
+                  : used ? "used_some_axes"
+                         : "sigma_above_threshold",
+                  reason);
+}
+
+std::optional<Alignment> FusionGate::Impl::best_alignment() const {
+  if (aligned()) {
+    return Alignment{lio->odom_epoch, lio->T_map_odom, lio->T_map_odom_covariance};
+  }
+  if (!window.solution()) {
+    return std::nullopt;
+  }
+  return Alignment{
+      lio ? lio->odom_epoch : 0, window.solution()->T_map_odom, window.solution()->covariance};
+}
+
+void FusionGate::Impl::take_lio_status(const LioStatus& next, Output& out) {
+  if (next.aligned &&
+      !(next.T_map_odom.pose().is_finite() && next.T_map_odom_covariance.allFinite())) {
+    tell(out, Severity::kError, "lio_status_refused", "T_map_odom in lio/status is not finite");
+    return;
+  }
+  advance(next.stamp_ns);
+  const bool was_aligned = aligned();
+  if (lio && lio->odom_epoch != next.odom_epoch) {
+    begin_epoch(next, out);
+  }
+  lio = next;
+  if (aligned() && (!was_aligned || !pending.empty())) {
+    window.clear();
+    const std::deque<AcceptedFix> waiting = std::move(pending);
+    pending.clear();
+    for (const AcceptedFix& fix : waiting) {
+      make_rows(fix, out);
+    }
+  }
+}
+
+void FusionGate::Impl::begin_epoch(const LioStatus& next, Output& out) {
+  lio_poses.forget_before(next.stamp_ns);
+  window.clear();
+  pending.clear();
+  last_imu_rate_ns.reset();
+  tell(out,
+       Severity::kWarning,
+       "odom_epoch",
+       "LIO began odom epoch " + std::to_string(next.odom_epoch) + ": aligning anew");
+}
+
+}  // namespace trigpoint::fusion_gate

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "checks/gps_sources.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace trigpoint::fusion_gate {
+namespace {
+
+GpsStatus status_at(double stamp_s, GpsHealth health, double accepted_s = 1.0) {
+  GpsStatus status;
+  status.stamp_ns = from_seconds(stamp_s);
+  status.health = health;
+  status.last_accepted_fix_ns = from_seconds(accepted_s);
+  return status;
+}
+
+TEST(GpsSources, follow_nobody_before_somebody_is_heard) {
+  GpsSources sources{Config{}};
+  EXPECT_FALSE(sources.select(0));
+  EXPECT_EQ(sources.followed(), "");
+}
+
+TEST(GpsSources, prefer_health_over_the_newer_fix) {
+  GpsSources sources{Config{}};
+  sources.on_status(status_at(10.0, GpsHealth::kDegraded, 9.9), "a");
+  sources.on_status(status_at(10.0, GpsHealth::kOk, 9.0), "b");
+  sources.select(from_seconds(10.0));
+  EXPECT_EQ(sources.followed(), "b");
+}
+
+TEST(GpsSources, prefer_the_newer_fix_at_equal_health) {
+  GpsSources sources{Config{}};
+  sources.on_status(status_at(10.0, GpsHealth::kOk, 9.0), "a");
+  sources.on_status(status_at(10.0, GpsHealth::kOk, 9.5), "b");
+  sources.select(from_seconds(10.0));
+  EXPECT_EQ(sources.followed(), "b");
+}
+
+TEST(GpsSources, do_not_flap_between_equals) {
+  GpsSources sources{Config{}};
+  int changes = 0;
+  for (int k = 0; k < 100; ++k) {
+    const double now_s = 10.0 + 0.1 * k;
+    sources.on_status(status_at(now_s, GpsHealth::kOk, now_s), k % 2 == 0 ? "a" : "b");
+    changes += sources.select(from_seconds(now_s)) ? 1 : 0;
+  }
+  EXPECT_EQ(changes, 1);
+}
+
+TEST(GpsSources, change_over_when_the_followed_one_goes_silent) {
+  GpsSources sources{Config{}};
+  sources.on_status(status_at(10.0, GpsHealth::kOk, 10.0), "a");
+  sources.on_status(status_at(10.0, GpsHealth::kDegraded, 10.0), "b");
+  sources.select(from_seconds(10.0));
+  EXPECT_EQ(sources.followed(), "a");
+  sources.on_status(status_at(11.5, GpsHealth::kDegraded, 11.5), "b");
+  EXPECT_TRUE(sources.select(from_seconds(11.5)));
+  EXPECT_EQ(sources.followed(), "b");
+}
+
+TEST(GpsSources, change_over_to_a_healthier_one_only_after_the_hold_time) {
+  GpsSources sources{Config{}};
+  sources.on_status(status_at(10.0, GpsHealth::kOk), "a");
+  sources.select(from_seconds(10.0));
+  sources.on_status(status_at(10.1, GpsHealth::kDeadReckoning), "a");
+  sources.on_status(status_at(10.1, GpsHealth::kOk), "b");
+  EXPECT_FALSE(sources.select(from_seconds(10.1)));
+  EXPECT_TRUE(sources.select(from_seconds(10.7)));
+  EXPECT_EQ(sources.followed(), "b");
+}
+
+TEST(GpsSources, follow_nobody_when_all_are_silent) {
+  GpsSources sources{Config{}};
+  sources.on_status(status_at(10.0, GpsHealth::kOk), "a");
+  sources.select(from_seconds(10.0));
+  EXPECT_TRUE(sources.select(from_seconds(12.0)));
+  EXPECT_EQ(sources.followed(), "");
+}
+
+TEST(GpsSources, refuse_odometry_that_is_not_finite_or_goes_back) {
+  GpsSources sources{Config{}};
+  Odometry odometry;
+  odometry.stamp_ns = from_seconds(10.0);
+  EXPECT_FALSE(sources.on_odometry(odometry, "a"));
+  odometry.stamp_ns = from_seconds(9.0);
+  EXPECT_TRUE(sources.on_odometry(odometry, "a"));
+  odometry.stamp_ns = from_seconds(11.0);
+  odometry.T_frame_child.p.x() = std::nan("");
+  EXPECT_TRUE(sources.on_odometry(odometry, "a"));
+}
+
+}  // namespace
+}  // namespace trigpoint::fusion_gate

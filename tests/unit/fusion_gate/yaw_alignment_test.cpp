@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "alignment/yaw_alignment.hpp"
+
+#include "trigpoint/base/so3.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+namespace trigpoint::fusion_gate {
+namespace {
+
+constexpr double kDegree_rad = 0.017453292519943295;
+const YawPose kTruth{170.0 * kDegree_rad, {12.0, -7.0, 3.0}};
+
+struct Drive {
+  int fixes{40};
+  double interval_s{0.5};
+  double speed_mps{1.2};
+  double turn_radps{0.0};
+  double sigma_m{0.02};
+};
+
+/// Noise-free pairs along a straight line or an arc.
+std::vector<AlignmentPair> drive_pairs(const Drive& drive, const YawPose& T_map_odom) {
+  std::vector<AlignmentPair> pairs;
+  Eigen::Vector3d p_odom_m{0.3, -0.2, 0.1};
+  for (int k = 0; k < drive.fixes; ++k) {
+    const double heading_rad = 0.4 + drive.turn_radps * k * drive.interval_s;
+    const double step_m = drive.speed_mps * drive.interval_s;
+    AlignmentPair pair;
+    pair.stamp_ns = from_seconds(100.0 + k * drive.interval_s);
+    pair.p_odom_m = p_odom_m;
+    pair.p_map_m = T_map_odom.pose() * p_odom_m;
+    pair.variance_map_m2.setConstant(drive.sigma_m * drive.sigma_m);
+    pair.distance_m = step_m * k;
+    pairs.push_back(pair);
+    p_odom_m += step_m * Eigen::Vector3d(std::cos(heading_rad), std::sin(heading_rad), 0.01);
+  }
+  return pairs;
+}
+
+/// Adds what the configuration says GPS errors are: a Gauss-Markov and a white part; and LIO's
+/// walk.
+void add_errors(std::vector<AlignmentPair>& pairs, const AlignmentConfig& config, unsigned seed) {
+  std::mt19937 generator(seed);
+  std::normal_distribution<double> normal;
+  const auto sample = [&] {
+    return Eigen::Vector3d(normal(generator), normal(generator), normal(generator));
+  };
+  Eigen::Vector3d slow = sample();
+  Eigen::Vector3d walk_m = Eigen::Vector3d::Zero();
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    if (k > 0) {
+      const double rho = std::exp(-to_seconds(pairs[k].stamp_ns - pairs[k - 1].stamp_ns) /
+                                  config.correlation_time_s);
+      slow = rho * slow + std::sqrt(1.0 - rho * rho) * sample();
+      walk_m += config.lio_drift_m_per_sqrt_m *
+                std::sqrt(pairs[k].distance_m - pairs[k - 1].distance_m) * sample();
+    }
+    const Eigen::Vector3d sigma_m = pairs[k].variance_map_m2.cwiseSqrt();
+    pairs[k].p_map_m += sigma_m.cwiseProduct(std::sqrt(config.correlated_share) * slow +
+                                             std::sqrt(config.white_share) * sample());
+    pairs[k].p_odom_m += walk_m;
+  }
+}
+
+TEST(YawAlignment, recovers_a_170_degree_yaw_from_noise_free_pairs) {
+  Drive drive;
+  drive.turn_radps = 0.1;
+  const auto solution = solve_alignment(drive_pairs(drive, kTruth), {});
+  ASSERT_TRUE(solution);
+  EXPECT_NEAR(solution->T_map_odom.yaw_rad, kTruth.yaw_rad, 1e-9);
+  EXPECT_NEAR((solution->T_map_odom.p - kTruth.p).norm(), 0.0, 1e-8);
+  EXPECT_EQ(find_obstacle(*solution, {}), std::nullopt);
+}
+
+TEST(YawAlignment, needs_only_a_straight_line_at_any_yaw) {
+  for (int degrees = -180; degrees < 180; degrees += 15) {
+    const YawPose truth{degrees * kDegree_rad, kTruth.p};
+    const auto solution = solve_alignment(drive_pairs({}, truth), {});
+    ASSERT_TRUE(solution);
+    EXPECT_NEAR(wrap_angle(solution->T_map_odom.yaw_rad - truth.yaw_rad), 0.0, 1e-9) << degrees;
+    EXPECT_EQ(find_obstacle(*solution, {}), std::nullopt) << degrees;
+  }
+}
+
+TEST(YawAlignment, is_not_admitted_after_three_metres) {
+  Drive drive;
+  drive.fixes = 30;
+  drive.speed_mps = 0.2;
+  const auto solution = solve_alignment(drive_pairs(drive, kTruth), {});
+  ASSERT_TRUE(solution);
+  EXPECT_LT(solution->baseline_m, 3.0);
+  EXPECT_THAT(find_obstacle(*solution, {}).value_or(""), testing::HasSubstr("baseline"));
+}
+
+TEST(YawAlignment, says_that_one_pair_does_not_give_a_yaw) {
+  Drive drive;
+  drive.fixes = 1;
+  const auto solution = solve_alignment(drive_pairs(drive, kTruth), {});
+  ASSERT_TRUE(solution);
+  EXPECT_GT(solution->yaw_sigma_rad(), 3.0);
+}
+
+TEST(YawAlignment, waits_for_a_longer_baseline_when_fixes_are_coarse) {
+  Drive drive;
+  drive.fixes = 40;
+  drive.sigma_m = 1.5;
+  const auto solution = solve_alignment(drive_pairs(drive, kTruth), {});
+  ASSERT_TRUE(solution);
+  EXPECT_THAT(find_obstacle(*solution, {}).value_or(""), testing::HasSubstr("yaw sigma"));
+}
+
+/// 200 drives: the spread of the errors against the sigma that was predicted.
+struct Spread {
+  double yaw_rms_rad{0.0};
+  double yaw_sigma_rad{0.0};
+  double nees{0.0};  // of all four states; 4 when the covariance is right
+};
+
+Spread measure_spread(const Drive& drive) {
+  constexpr unsigned kSeeds = 200;
+  const AlignmentConfig config;
+  Spread spread;
+  for (unsigned seed = 1; seed <= kSeeds; ++seed) {
+    std::vector<AlignmentPair> pairs = drive_pairs(drive, kTruth);
+    add_errors(pairs, config, seed);
+    const AlignmentSolution solution = solve_alignment(pairs, config).value();
+    // LIO's walk is counted back from the newest pair: the truth is the transform that maps the
+    // newest pair's drifted position to where it is.
+    const Eigen::Vector3d drift_m =
+        pairs.back().p_odom_m - drive_pairs(drive, kTruth).back().p_odom_m;
+    Eigen::Vector4d error;
+    error[0] = wrap_angle(solution.T_map_odom.yaw_rad - kTruth.yaw_rad);
+    error.tail<3>() = solution.T_map_odom.p - (kTruth.p - from_yaw(kTruth.yaw_rad) * drift_m);
+    spread.yaw_rms_rad += error[0] * error[0] / kSeeds;
+    spread.yaw_sigma_rad += solution.covariance(0, 0) / kSeeds;
+    spread.nees += error.dot(solution.covariance.ldlt().solve(error)) / kSeeds;
+  }
+  spread.yaw_rms_rad = std::sqrt(spread.yaw_rms_rad);
+  spread.yaw_sigma_rad = std::sqrt(spread.yaw_sigma_rad);
+  return spread;
+}
+
+// 200 draws know a sigma to 5 %; robust weights and the scaling by chi-square make the prediction
+// slightly cautious.
+constexpr double kLowestRatio = 0.75;
+constexpr double kHighestRatio = 1.15;
+
+TEST(YawAlignment, predicts_the_yaw_error_of_rtk_with_correlated_errors) {
+  const Spread spread = measure_spread({});
+  EXPECT_GT(spread.yaw_rms_rad / spread.yaw_sigma_rad, kLowestRatio);
+  EXPECT_LT(spread.yaw_rms_rad / spread.yaw_sigma_rad, kHighestRatio);
+  EXPECT_GT(spread.nees, 4.0 * 0.5);
+  EXPECT_LT(spread.nees, 4.0 * 1.25);
+}
+
+TEST(YawAlignment, predicts_the_yaw_error_of_coarse_gps_with_correlated_errors) {
+  Drive drive;
+  drive.sigma_m = 1.0;
+  drive.fixes = 100;
+  drive.turn_radps = 0.02;
+  const Spread spread = measure_spread(drive);
+  EXPECT_GT(spread.yaw_rms_rad / spread.yaw_sigma_rad, kLowestRatio);
+  EXPECT_LT(spread.yaw_rms_rad / spread.yaw_sigma_rad, kHighestRatio);
+}
+
+TEST(YawAlignment, would_be_overconfident_without_the_correlation) {
+  Drive drive;
+  drive.sigma_m = 1.0;
+  drive.fixes = 100;
+  std::vector<AlignmentPair> pairs = drive_pairs(drive, kTruth);
+  AlignmentConfig white;
+  white.correlated_share = 0.0;
+  white.white_share = 1.2;
+  const double honest_rad = solve_alignment(pairs, {}).value().yaw_sigma_rad();
+  const double white_rad = solve_alignment(pairs, white).value().yaw_sigma_rad();
+  EXPECT_GT(honest_rad, 2.0 * white_rad);
+}
+
+TEST(YawAlignment, is_not_spoiled_by_wild_fixes) {
+  Drive drive;
+  drive.fixes = 30;
+  std::vector<AlignmentPair> pairs = drive_pairs(drive, kTruth);
+  add_errors(pairs, {}, 7);
+  const AlignmentSolution clean = solve_alignment(pairs, {}).value();
+  pairs[2].p_map_m += Eigen::Vector3d(40.0, -60.0, 20.0);
+  pairs[17].p_map_m += Eigen::Vector3d(-5.0, 3.0, 0.0);
+  pairs.back().p_map_m += Eigen::Vector3d(0.0, 8.0, -4.0);
+  const AlignmentSolution spoiled = solve_alignment(pairs, {}).value();
+  EXPECT_NEAR(spoiled.T_map_odom.yaw_rad, clean.T_map_odom.yaw_rad, clean.yaw_sigma_rad());
+  EXPECT_LT((spoiled.T_map_odom.p - clean.T_map_odom.p).norm(), 0.05);
+  EXPECT_EQ(find_obstacle(spoiled, {}), std::nullopt);
+}
+
+TEST(YawAlignment, refuses_residuals_far_beyond_the_reported_sigmas) {
+  std::vector<AlignmentPair> pairs = drive_pairs({}, kTruth);
+  for (std::size_t k = 0; k < pairs.size(); ++k) {  // 20 sigma, alternating
+    pairs[k].p_map_m.y() += k % 2 == 0 ? 0.4 : -0.4;
+  }
+  const AlignmentSolution solution = solve_alignment(pairs, {}).value();
+  EXPECT_NE(find_obstacle(solution, {}), std::nullopt);
+}
+
+TEST(YawAlignment, gives_the_covariance_of_a_hand_made_case) {
+  // White errors only, no drift, pairs symmetric about the odom origin: yaw and translation
+  // separate, sigma_yaw^2 = s^2 / sum |a|^2 and sigma_t^2 = s^2 / n.
+  AlignmentConfig config;
+  config.correlated_share = 0.0;
+  config.white_share = 1.0;
+  config.lio_drift_m_per_sqrt_m = 0.0;
+  std::vector<AlignmentPair> pairs;
+  double sum_m2 = 0.0;
+  for (int k = -5; k <= 5; ++k) {
+    AlignmentPair pair;
+    pair.stamp_ns = from_seconds(k);
+    pair.p_odom_m = {2.0 * k, -1.0 * k, 0.0};
+    pair.p_map_m = kTruth.pose() * pair.p_odom_m;
+    pair.variance_map_m2.setConstant(0.04);
+    sum_m2 += pair.p_odom_m.squaredNorm();
+    pairs.push_back(pair);
+  }
+  const AlignmentSolution solution = solve_alignment(pairs, config).value();
+  EXPECT_NEAR(solution.covariance(0, 0), 0.04 / sum_m2, 1e-7);
+  EXPECT_NEAR(solution.covariance(1, 1), 0.04 / 11.0, 1e-7);
+  EXPECT_NEAR(solution.covariance(0, 1), 0.0, 1e-9);
+}
+
+TEST(YawAlignment, returns_nothing_without_pairs_or_with_nan) {
+  EXPECT_FALSE(solve_alignment({}, {}));
+  std::vector<AlignmentPair> pairs = drive_pairs({}, kTruth);
+  pairs[3].p_map_m.x() = std::nan("");
+  EXPECT_FALSE(solve_alignment(pairs, {}));
+}
+
+}  // namespace
+}  // namespace trigpoint::fusion_gate
