@@ -37,16 +37,31 @@ struct SweepRefusal {
   std::string text;
 };
 
+struct DecodedPoints;
+
 /// Decodes clouds by field name and offset (Velodyne, Ouster, Hesai, Livox, KITTI layouts:
-/// research/dds section 3), detects unit and origin of the point times and says so once as an event.
+/// README), detects unit and origin of the point times and says so once as an event.
+/// The unit is kept once found, as long as it makes the times a sweep.
 class SweepDecoder {
  public:
+  /// Throws std::invalid_argument for a word that is no choice of its key.
   explicit SweepDecoder(const SweepTimingConfig& config);
+  /// On success the sweep has at least one point. Otherwise nothing of the cloud was used.
   std::variant<Sweep, SweepRefusal> decode(const PointCloudMessage& cloud, Events& events);
 
  private:
+  std::optional<SweepRefusal> time_by_field(const PointCloudMessage& cloud,
+                                            const DecodedPoints& decoded,
+                                            Sweep& sweep,
+                                            Events& events);
+  void announce(Nanoseconds stamp_ns,
+                const std::string& meaning,
+                const std::string& details,
+                Events& events);
+
   SweepTimingConfig config_;
   std::string announced_;
+  std::optional<double> unit_s_;
 };
 
 }  // namespace trigpoint::lio_mapper
