@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// A drive that never happened, as a log: LiDAR, IMU and fixes in order of arrival, bit-identical
+// for the same scenario and seed. The truth is never among the entries.
+#pragma once
+
+#include "trigpoint/base/pose.hpp"
+#include "trigpoint/base/time.hpp"
+#include "trigpoint/recording/log.hpp"
+#include "trigpoint/simulator/scenario.hpp"
+
+#include <Eigen/Core>
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+namespace trigpoint::simulator {
+
+/// base_link at one moment, in map (ENU at the scenario's datum).
+struct TrueState {
+  Pose T_map_base;
+  Eigen::Vector3d v_map_mps{Eigen::Vector3d::Zero()};
+  Eigen::Vector3d a_map_mps2{Eigen::Vector3d::Zero()};
+  Eigen::Vector3d omega_base_radps{Eigen::Vector3d::Zero()};
+};
+
+/// What the robot really did: analytic in time, defined for every moment of the run.
+class Truth {
+ public:
+  virtual ~Truth() = default;
+  virtual TrueState at(Nanoseconds stamp_ns) const = 0;
+  virtual Nanoseconds first_ns() const = 0;
+  virtual Nanoseconds last_ns() const = 0;
+};
+
+/// The true drive of a scenario, without any sensor. It depends on the seed through the relief and
+/// the vibration only.
+std::shared_ptr<const Truth> make_truth(const Scenario& scenario,
+                                        std::uint64_t seed,
+                                        std::optional<double> duration_s = std::nullopt);
+
+/// Writes base_link in map as TUM (stamp x y z qx qy qz qw, 9 decimals of stamp), with frame and
+/// datum in a comment. Throws std::runtime_error naming the file when it cannot be written.
+void write_truth(const Truth& truth,
+                 const Datum& datum,
+                 const std::string& path,
+                 double rate_hz = 100.0);
+
+struct StreamOptions {
+  bool lidar{true};
+};
+
+/// A LogReader that makes its entries while it is read.
+class ScenarioReader : public recording::LogReader {
+ public:
+  virtual std::shared_ptr<const Truth> truth() const = 0;
+  virtual const Scenario& scenario() const = 0;
+  /// Writes the truth and gives its path to truth_file() from now on.
+  virtual void write_truth(const std::string& path) = 0;
+};
+
+/// `duration_s` replaces the scenario's own.
+std::unique_ptr<ScenarioReader> open_scenario(const Scenario& scenario,
+                                              std::uint64_t seed,
+                                              std::optional<double> duration_s = std::nullopt,
+                                              const StreamOptions& options = {});
+
+/// Called with a share of 0 to 1.
+using Progress = std::function<void(double)>;
+
+/// Writes out_dir/log (rosbag2), truth.tum, scenario.yaml and robot.yaml (an overlay with the
+/// section `robot`). Throws recording::LogError or std::runtime_error naming the file and the
+/// cause; out_dir may exist, out_dir/log must not.
+void simulate(const Scenario& scenario,
+              std::uint64_t seed,
+              std::optional<double> duration_s,
+              const std::string& out_dir,
+              const Progress& progress = {},
+              const StreamOptions& options = {});
+
+}  // namespace trigpoint::simulator

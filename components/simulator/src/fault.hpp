@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// What goes wrong with the sensors, and when. A new fault is a class in its own file under faults/
+// and one line in fault_registry.cpp.
+#pragma once
+
+#include "trigpoint/base/config.hpp"
+#include "trigpoint/base/measurements.hpp"
+
+#include "random.hpp"
+#include "registry.hpp"
+#include <Eigen/Core>
+
+#include <limits>
+#include <string>
+
+namespace trigpoint::simulator {
+
+/// One fix on its way from the sky to the wire. ENU of the antenna.
+struct GnssEpoch {
+  Nanoseconds stamp_ns{0};
+  Eigen::Vector3d antenna_map_m{Eigen::Vector3d::Zero()};  ///< where the antenna truly is
+  std::string gnss_class;   ///< decides the errors, and what the driver reports
+  double error_scale{1.0};  ///< on the errors of the class
+  Eigen::Vector3d extra_error_m{Eigen::Vector3d::Zero()};  ///< on top of them
+  double latency_s{0.0};
+  bool lost{false};
+};
+
+struct ImuEpoch {
+  ImuSample sample;
+  bool lost{false};
+};
+
+/// One sweep before its rays are cast.
+struct SweepEpoch {
+  Nanoseconds stamp_ns{0};
+  bool lost{false};     ///< no message at all
+  bool blank{false};    ///< a message without points
+  double dropout{0.0};  ///< share of returns lost
+};
+
+/// The moment at which a fault acts.
+struct FaultMoment {
+  double since_start_s{0.0};
+  Random& each;   ///< new at every measurement
+  Random& whole;  ///< the same numbers at every measurement: draws that hold for the whole fault
+};
+
+class Fault {
+ public:
+  virtual ~Fault() = default;
+
+  /// The fault's own settings, besides type, start_s and duration_s.
+  virtual void describe(ConfigFields& fields) = 0;
+
+  // Called only while the fault is active.
+  virtual void on_gnss(GnssEpoch&, const FaultMoment&) const {}
+
+  virtual void on_imu(ImuEpoch&, const FaultMoment&) const {}
+
+  virtual void on_sweep(SweepEpoch&, const FaultMoment&) const {}
+
+  std::string type;
+  double start_s{0.0};  ///< from the scenario's start
+  double duration_s{std::numeric_limits<double>::max()};
+};
+
+const Registry<Fault>& fault_registry();
+
+}  // namespace trigpoint::simulator
