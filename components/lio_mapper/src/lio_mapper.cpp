@@ -1,0 +1,425 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "trigpoint/lio_mapper/lio_mapper.hpp"
+
+#include "trigpoint/base/config.hpp"
+#include "trigpoint/base/so3.hpp"
+
+#include "downsample.hpp"
+#include "imu_buffer.hpp"
+#include "imu_intake.hpp"
+#include "imu_rate_odometry.hpp"
+#include "keyframe_trigger.hpp"
+#include "scan_filter.hpp"
+#include "start_up.hpp"
+#include "sweep.hpp"
+
+#include <cmath>
+#include <deque>
+
+namespace trigpoint::lio_mapper {
+
+namespace {
+
+/// Sweeps that may wait for IMU samples: three seconds at 10 Hz.
+constexpr std::size_t kMaxWaitingSweeps = 30;
+/// At the end of a log the last sweep may outlive the last IMU sample by this much.
+constexpr double kHeldImu_s = 0.05;
+/// A first sweep may begin this much before the IMU does.
+constexpr double kEarlySweep_s = 0.15;
+/// IMU kept before the first start, beyond the levelling window.
+constexpr double kKeptBeforeStart_s = 5.0;
+/// A pose less certain than this relative to the local map is not a good one.
+constexpr double kDegradedSigma_m = 0.3;
+
+std::string seconds_text(Nanoseconds duration_ns) {
+  return std::to_string(to_seconds(duration_ns)) + " s";
+}
+
+void require(bool holds, const std::string& rule) {
+  if (!holds) {
+    throw ConfigError("lio_mapper: " + rule);
+  }
+}
+
+const Config& checked(const Config& config) {
+  require(config.sweep.min_range_m < config.sweep.max_range_m,
+          "sweep.min_range_m must be less than sweep.max_range_m");
+  require(config.imu.max_gap_s <= config.imu.lost_gap_s,
+          "imu.max_gap_s must not exceed imu.lost_gap_s");
+  require(config.local_map.half_side_m > config.local_map.prune_every_m,
+          "local_map.half_side_m must exceed local_map.prune_every_m");
+  return config;
+}
+
+}  // namespace
+
+struct LioMapper::Impl {
+  Impl(const Config& config_in, const RobotConfig& robot)
+      : config(checked(config_in)),
+        T_base_lidar(robot.T_base_lidar()),
+        decoder(config.sweep),
+        intake(robot.q_base_imu()),
+        imu_rate(config.imu, config.imu_rate_odometry_hz),
+        keyframe_trigger(config.keyframes) {}
+
+  void queue(Sweep sweep, Output& output);
+  void process_what_is_covered(Output& output);
+  void start_when_possible(Output& output);
+  void process_front(Output& output);
+  void refuse_front(const std::string& reason, const std::string& text, Output& output);
+  void refuse_sweep(const std::string& reason,
+                    Nanoseconds stamp_ns,
+                    const std::string& text,
+                    Output& output);
+  std::optional<std::string> objection_to(const Sweep& sweep) const;
+  void apply_rows(const StateUpdate& update, Output& output);
+  void align(const Alignment& alignment, Nanoseconds stamp_ns, Output& output);
+  void count_row(const StateUpdate& update, const RowVerdict& verdict, Output& output);
+  void judge_health(const ScanOutcome& outcome, Nanoseconds stamp_ns, Output& output);
+  void report(const ScanOutcome& outcome, Output& output);
+  Keyframe make_keyframe(const ScanOutcome& outcome, const Odometry& odometry);
+  void refresh_status();
+
+  Config config;
+  Pose T_base_lidar;
+  SweepDecoder decoder;
+  ImuIntake intake;
+  ImuBuffer imu;
+  std::deque<Sweep> sweeps;
+  std::optional<ScanFilter> filter;
+  ImuRateOdometry imu_rate;
+  KeyframeTrigger keyframe_trigger;
+  std::uint64_t next_keyframe{0};
+  LioStatus status;
+  Tally refused_scans;
+  Nanoseconds newest_sweep_ns{0};
+  Nanoseconds last_used_ns{0};
+  Nanoseconds trouble_told_ns{0};
+};
+
+void LioMapper::Impl::refuse_sweep(const std::string& reason,
+                                   Nanoseconds stamp_ns,
+                                   const std::string& text,
+                                   Output& output) {
+  refused_scans.add(reason);
+  output.events.push_back({Severity::kWarning, stamp_ns, "scan_refused_" + reason, text});
+}
+
+void LioMapper::Impl::refuse_front(const std::string& reason,
+                                   const std::string& text,
+                                   Output& output) {
+  refuse_sweep(reason, sweeps.front().end_ns, text, output);
+  sweeps.pop_front();
+}
+
+void LioMapper::Impl::queue(Sweep sweep, Output& output) {
+  if (newest_sweep_ns != 0 && sweep.end_ns <= newest_sweep_ns) {
+    refuse_sweep("stamp_not_after_previous",
+                 sweep.end_ns,
+                 "refused a sweep that ends " + seconds_text(newest_sweep_ns - sweep.end_ns) +
+                     " before its predecessor, expected stamps that grow",
+                 output);
+    return;
+  }
+  if (sweep.points.empty()) {
+    refuse_sweep("no_points",
+                 sweep.end_ns,
+                 "refused a sweep without a usable point (" +
+                     std::to_string(sweep.points_received) + " received)",
+                 output);
+    return;
+  }
+  newest_sweep_ns = sweep.end_ns;
+  sweeps.push_back(std::move(sweep));
+  if (sweeps.size() > kMaxWaitingSweeps) {
+    const std::string newest =
+        imu.empty() ? "none has come"
+                    : "the newest is " + seconds_text(sweeps.front().end_ns - imu.newest_ns()) +
+                          " older than the sweep's end";
+    refuse_front("imu_missing",
+                 "refused a sweep that waited too long for IMU samples: " + newest +
+                     "; do both clocks agree?",
+                 output);
+  }
+}
+
+std::optional<std::string> LioMapper::Impl::objection_to(const Sweep& sweep) const {
+  const Nanoseconds begin_ns = std::max(sweep.begin_ns, filter ? filter->stamp_ns() : 0);
+  if (imu.empty() || sweep.end_ns <= imu.oldest_ns() ||
+      to_seconds(imu.oldest_ns() - begin_ns) > kEarlySweep_s) {
+    return "imu_starts_later";
+  }
+  if (imu.longest_gap_s(std::max(begin_ns, imu.oldest_ns()), sweep.end_ns) >
+      config.imu.lost_gap_s) {
+    return "imu_gap";
+  }
+  return std::nullopt;
+}
+
+void LioMapper::Impl::start_when_possible(Output& output) {
+  while (!sweeps.empty() && sweeps.front().end_ns <= imu.newest_ns() &&
+         objection_to(sweeps.front())) {
+    refuse_front(
+        *objection_to(sweeps.front()), "refused a sweep that the IMU does not cover", output);
+  }
+  if (!can_start(config.start, imu, sweeps)) {
+    return;
+  }
+  const StartResult result = start(config, T_base_lidar, imu, sweeps);
+  if (result.trouble) {
+    if (to_seconds(imu.newest_ns() - trouble_told_ns) > 1.0) {
+      output.events.push_back(*result.trouble);
+      trouble_told_ns = imu.newest_ns();
+    }
+    refuse_front("imu_implausible", result.trouble->text, output);
+    return;
+  }
+  filter.emplace(config, T_base_lidar, result.initial);
+  last_used_ns = result.initial.stamp_ns;
+  output.events.push_back(
+      {Severity::kInfo,
+       result.initial.stamp_ns,
+       "lio_started",
+       std::string("odom begins ") + (result.at_rest ? "at rest" : "in motion") + ", speed " +
+           std::to_string(result.speed_mps) + " m/s, roll and pitch " +
+           std::to_string(roll_pitch_yaw_of(result.initial.state.T_odom_base.q).x()) + " and " +
+           std::to_string(roll_pitch_yaw_of(result.initial.state.T_odom_base.q).y()) + " rad"});
+}
+
+void LioMapper::Impl::process_what_is_covered(Output& output) {
+  if (!filter && !imu.empty()) {
+    start_when_possible(output);
+  }
+  while (filter && !sweeps.empty() && sweeps.front().end_ns <= imu.newest_ns()) {
+    process_front(output);
+  }
+}
+
+void LioMapper::Impl::process_front(Output& output) {
+  const Sweep& sweep = sweeps.front();
+  if (const auto reason = objection_to(sweep)) {
+    refuse_front(*reason, "refused a sweep that the IMU does not cover", output);
+    return;
+  }
+  const ScanOutcome outcome = filter->process(sweep, imu);
+  for (const StateUpdate& update : filter->take_covered()) {
+    count_row(update, filter->apply(update), output);
+  }
+  filter->insert(outcome);
+  judge_health(outcome, sweep.end_ns, output);
+  report(outcome, output);
+  sweeps.pop_front();
+  imu.forget_before(filter->stamp_ns());
+  imu_rate.restart(*filter, imu);
+}
+
+void LioMapper::Impl::judge_health(const ScanOutcome& outcome,
+                                   Nanoseconds stamp_ns,
+                                   Output& output) {
+  const LioHealth before = status.health;
+  if (outcome.used) {
+    last_used_ns = stamp_ns;
+    ++status.scans_used;
+    const double sigma2 = filter->pose_covariance_in_local_map().diagonal().head<3>().maxCoeff();
+    status.health =
+        sigma2 > kDegradedSigma_m * kDegradedSigma_m ? LioHealth::kDegraded : LioHealth::kOk;
+  } else {
+    refused_scans.add("too_few_matches");
+    const bool lost = to_seconds(stamp_ns - last_used_ns) > config.matching.lost_after_s;
+    status.health = lost ? LioHealth::kLost : LioHealth::kDegraded;
+  }
+  if (status.health == before || status.health == LioHealth::kInit) {
+    return;
+  }
+  const bool good = status.health == LioHealth::kOk;
+  output.events.push_back(
+      {good ? Severity::kInfo : Severity::kWarning,
+       stamp_ns,
+       good ? "lio_ok" : (status.health == LioHealth::kLost ? "lio_lost" : "lio_degraded"),
+       std::to_string(outcome.matches) + " of " + std::to_string(outcome.points) +
+           " points matched (at least " + std::to_string(config.matching.min_matches) +
+           " needed), " + seconds_text(stamp_ns - last_used_ns) + " since the last usable scan" +
+           (good ? "" : "; going on with the IMU alone where the scan does not help")});
+}
+
+void LioMapper::Impl::refresh_status() {
+  status.imu_received = intake.received();
+  status.scans_refused = refused_scans.counts();
+  if (!filter) {
+    return;
+  }
+  status.stamp_ns = filter->stamp_ns();
+  status.aligned = filter->aligned();
+  status.T_map_odom = filter->state().T_map_odom;
+  if (status.aligned) {
+    status.T_map_odom_covariance =
+        filter->covariance().block<4, 4>(error::kYawMapOdom, error::kYawMapOdom);
+  }
+  status.distance_m = filter->distance_m();
+  const Matrix6d covariance = filter->pose_covariance_in_local_map();
+  for (int i = 0; i < 6; ++i) {
+    status.sigma[static_cast<std::size_t>(i)] = std::sqrt(std::max(0.0, covariance(i, i)));
+  }
+}
+
+Keyframe LioMapper::Impl::make_keyframe(const ScanOutcome& outcome, const Odometry& odometry) {
+  Keyframe keyframe;
+  keyframe.id = next_keyframe++;
+  keyframe.stamp_ns = odometry.stamp_ns;
+  keyframe.odom_epoch = status.odom_epoch;
+  keyframe.T_odom_base = odometry.T_frame_child;
+  keyframe.pose_covariance = odometry.pose_covariance;
+  keyframe.aligned = filter->aligned();
+  keyframe.T_map_odom = filter->state().T_map_odom;
+  keyframe.points_base = downsample(outcome.points_base, config.keyframes.voxel_m);
+  return keyframe;
+}
+
+void LioMapper::Impl::report(const ScanOutcome& outcome, Output& output) {
+  ScanResult result;
+  const InertialSample& newest = imu.samples().back();
+  const State& state = filter->state();
+  result.odometry = odometry_of(state,
+                                filter->covariance(),
+                                filter->pose_covariance(),
+                                newest.gyro_radps,
+                                config.imu,
+                                filter->stamp_ns());
+  status.observability = outcome.observability;
+  refresh_status();
+  result.status = status;
+  const Eigen::Matrix3f R = state.T_odom_base.q.toRotationMatrix().cast<float>();
+  const Eigen::Vector3f t = state.T_odom_base.p.cast<float>();
+  result.points_odom.reserve(outcome.thinned_base.size());
+  for (const PointXyzi& point : outcome.thinned_base) {
+    const Eigen::Vector3f p = R * point.position() + t;
+    result.points_odom.push_back({p.x(), p.y(), p.z(), point.intensity});
+  }
+  if (outcome.used && keyframe_trigger.fires(filter->stamp_ns(), state.T_odom_base)) {
+    result.keyframe = make_keyframe(outcome, result.odometry);
+  }
+  output.scans.push_back(std::move(result));
+}
+
+void LioMapper::Impl::align(const Alignment& alignment, Nanoseconds stamp_ns, Output& output) {
+  const bool usable =
+      alignment.T_map_odom.p.allFinite() && std::isfinite(alignment.T_map_odom.yaw_rad) &&
+      alignment.covariance.allFinite() && alignment.covariance.diagonal().minCoeff() > 0.0;
+  if (!filter || filter->aligned() || alignment.odom_epoch != status.odom_epoch || !usable) {
+    return;  // a repeated first alignment is no news
+  }
+  filter->align(alignment);
+  refresh_status();
+  output.events.push_back({Severity::kInfo,
+                           stamp_ns,
+                           "lio_aligned",
+                           "odom is placed in map: yaw " +
+                               std::to_string(alignment.T_map_odom.yaw_rad) + " rad, sigma " +
+                               std::to_string(std::sqrt(alignment.covariance(0, 0))) + " rad"});
+}
+
+void LioMapper::Impl::count_row(const StateUpdate& update,
+                                const RowVerdict& verdict,
+                                Output& output) {
+  if (verdict.outcome == RowOutcome::kApplied) {
+    ++status.rows_applied;
+    status.last_row_fix_ns = update.fix_stamp_ns;
+  } else if (verdict.outcome == RowOutcome::kRefused) {
+    ++status.rows_refused;
+    status.last_refusal =
+        verdict.reason + " (fix of " + std::to_string(update.fix_stamp_ns) + " ns)";
+    output.events.push_back({Severity::kWarning,
+                             update.fix_stamp_ns,
+                             "row_refused_" + verdict.reason,
+                             "refused the GPS row of a fix " +
+                                 seconds_text(status.stamp_ns - update.fix_stamp_ns) +
+                                 " before the newest scan: " + verdict.reason});
+  }
+}
+
+void LioMapper::Impl::apply_rows(const StateUpdate& update, Output& output) {
+  if (update.first_alignment) {
+    align(*update.first_alignment, update.fix_stamp_ns, output);
+  }
+  const bool any = std::any_of(update.decision.begin(), update.decision.end(), [](AxisDecision d) {
+    return d == AxisDecision::kFused;
+  });
+  if (!any) {
+    return;
+  }
+  if (!filter) {
+    count_row(update, {RowOutcome::kRefused, "not_started"}, output);
+    return;
+  }
+  count_row(update, filter->apply(update), output);
+  imu_rate.restart(*filter, imu);
+  refresh_status();
+}
+
+LioMapper::LioMapper(const Config& config, const RobotConfig& robot)
+    : impl_(std::make_unique<Impl>(config, robot)) {}
+
+LioMapper::~LioMapper() = default;
+
+Output LioMapper::on_imu(const ImuSample& sample) {
+  Output output;
+  const auto accepted = impl_->intake.accept(sample, impl_->config.imu.max_gap_s, output.events);
+  if (!accepted) {
+    return output;
+  }
+  impl_->imu.push(*accepted);
+  if (!impl_->filter) {
+    impl_->imu.forget_before(
+        std::min(accepted->stamp_ns,
+                 impl_->sweeps.empty() ? accepted->stamp_ns : impl_->sweeps.front().begin_ns) -
+        from_seconds(kKeptBeforeStart_s));
+  }
+  impl_->process_what_is_covered(output);
+  output.odometry_imu_rate = impl_->imu_rate.advance(impl_->imu);
+  return output;
+}
+
+Output LioMapper::on_cloud(const PointCloudMessage& cloud) {
+  Output output;
+  ++impl_->status.scans_received;
+  auto decoded = impl_->decoder.decode(cloud, output.events);
+  if (const auto* refusal = std::get_if<SweepRefusal>(&decoded)) {
+    impl_->refuse_sweep(refusal->code, cloud.stamp_ns, refusal->text, output);
+    return output;
+  }
+  impl_->queue(std::move(std::get<Sweep>(decoded)), output);
+  impl_->process_what_is_covered(output);
+  return output;
+}
+
+Output LioMapper::on_state_update(const StateUpdate& update) {
+  Output output;
+  impl_->apply_rows(update, output);
+  return output;
+}
+
+Output LioMapper::finish() {
+  Output output;
+  Impl& impl = *impl_;
+  while (impl.filter && !impl.sweeps.empty() &&
+         to_seconds(impl.sweeps.front().end_ns - impl.imu.newest_ns()) < kHeldImu_s) {
+    impl.process_front(output);
+  }
+  while (!impl.sweeps.empty()) {
+    impl.refuse_front("imu_missing", "the log ended before the IMU covered this sweep", output);
+  }
+  impl.refresh_status();
+  return output;
+}
+
+PointCloud LioMapper::local_map() const {
+  return impl_->filter ? impl_->filter->map().points() : PointCloud{};
+}
+
+LioStatus LioMapper::status() const {
+  impl_->refresh_status();
+  return impl_->status;
+}
+
+}  // namespace trigpoint::lio_mapper

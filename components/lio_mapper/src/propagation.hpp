@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// IMU propagation of state and error.
+// Reference: [1] J. Sola, "Quaternion kinematics for the error-state Kalman filter",
+// arXiv:1711.02508, section 5 and appendix on integration (here: trapezoid in specific force).
+#pragma once
+
+#include "trigpoint/base/time.hpp"
+#include "trigpoint/lio_mapper/config.hpp"
+
+#include "state.hpp"
+#include <Eigen/Core>
+
+#include <vector>
+
+namespace trigpoint::lio_mapper {
+
+/// A sample in base axes: finite, in order.
+struct InertialSample {
+  Nanoseconds stamp_ns{0};
+  Eigen::Vector3d gyro_radps{Eigen::Vector3d::Zero()};
+  Eigen::Vector3d accel_mps2{Eigen::Vector3d::Zero()};
+};
+
+/// The sample between two others, linearly.
+InertialSample interpolate(const InertialSample& a, const InertialSample& b, Nanoseconds stamp_ns);
+
+/// A stretch of at most one IMU interval: what the two samples at its ends said.
+struct InertialStep {
+  InertialSample begin;
+  InertialSample end;
+
+  double duration_s() const { return to_seconds(end.stamp_ns - begin.stamp_ns); }
+};
+
+/// Transition F of the error over one step, in blocks; the rest is identity.
+/// dtheta' = rotation dtheta + rotation_gyro dbg, da = the accel_* terms summed,
+/// dv' = dv + da dt, dp' = dp + dv dt + da dt^2 / 2.
+struct StepJacobian {
+  double dt_s{0.0};
+  Eigen::Matrix3d rotation;
+  Eigen::Matrix3d rotation_gyro_bias;
+  Eigen::Matrix3d accel_rotation;
+  Eigen::Matrix3d accel_gyro_bias;
+  Eigen::Matrix3d accel_accel_bias;
+  Eigen::Matrix<double, 3, 2> accel_gravity;
+};
+
+State propagate(const State& state, const InertialStep& step);
+StepJacobian step_jacobian(const State& state, const InertialStep& step);
+
+/// matrix <- F matrix, without forming F.
+void apply_transition(const StepJacobian& jacobian, ErrorMatrix& matrix);
+
+/// covariance <- F covariance F^T + Q. `noise_factor` scales the densities.
+void propagate_covariance(const StepJacobian& jacobian,
+                          const ImuConfig& noise,
+                          double noise_factor,
+                          ErrorMatrix& covariance);
+
+/// A pose on the way and what is needed to go on from it to the next one.
+struct PathNode {
+  Nanoseconds stamp_ns{0};
+  Pose T_odom_base;
+  Eigen::Vector3d v_odom_mps{Eigen::Vector3d::Zero()};
+  Eigen::Vector3d acceleration_odom_mps2{Eigen::Vector3d::Zero()};  ///< until the next node
+  Eigen::Vector3d angular_radps{Eigen::Vector3d::Zero()};           ///< base axes, until the next
+};
+
+/// Poses at IMU stamps between two scans, as propagated, oldest first.
+class Path {
+ public:
+  void clear() { nodes_.clear(); }
+
+  void push_back(const PathNode& node) { nodes_.push_back(node); }
+
+  bool empty() const { return nodes_.empty(); }
+
+  Nanoseconds begin_ns() const { return nodes_.front().stamp_ns; }
+
+  Nanoseconds end_ns() const { return nodes_.back().stamp_ns; }
+
+  const PathNode& back() const { return nodes_.back(); }
+
+  const std::vector<PathNode>& nodes() const { return nodes_; }
+
+  /// Before the first node and after the last one the motion of the nearest node goes on.
+  Pose at(Nanoseconds stamp_ns) const;
+
+ private:
+  std::vector<PathNode> nodes_;
+};
+
+}  // namespace trigpoint::lio_mapper

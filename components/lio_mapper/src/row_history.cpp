@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "row_history.hpp"
+
+#include "trigpoint/base/so3.hpp"
+
+#include <Eigen/Cholesky>
+
+#include <algorithm>
+
+namespace trigpoint::lio_mapper {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+namespace {
+
+using Axes = std::vector<int>;
+using MatrixUpTo3 = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3>;
+using VectorUpTo3 = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1>;
+
+Axes admitted_axes(const StateUpdate& update) {
+  Axes axes;
+  for (int i = 0; i < 3; ++i) {
+    if (update.decision[static_cast<std::size_t>(i)] == AxisDecision::kFused) {
+      axes.push_back(i);
+    }
+  }
+  return axes;
+}
+
+/// Rows and columns of the admitted axes: what is left of a Gaussian when the others are not told.
+MatrixUpTo3 admitted_covariance(const StateUpdate& update) {
+  const Axes axes = admitted_axes(update);
+  return update.covariance_map_m2(axes, axes);
+}
+
+bool is_usable(const StateUpdate& update) {
+  if (!update.position_map_m.allFinite() || !update.lever_arm_base_m.allFinite()) {
+    return false;
+  }
+  if (update.mode == UpdateMode::kOverwrite) {
+    return true;
+  }
+  const MatrixUpTo3 R = admitted_covariance(update);
+  return R.allFinite() && R.isApprox(R.transpose(), 1e-6) && R.llt().info() == Eigen::Success &&
+         R.diagonal().minCoeff() > 0.0;
+}
+
+/// The standard update with up to three rows, in place.
+void condition_on(const StateUpdate& update,
+                  const RowPrediction& prediction,
+                  State& state,
+                  ErrorMatrix& covariance) {
+  const Axes axes = admitted_axes(update);
+  const ErrorRows H = prediction.jacobian(axes, Eigen::all);
+  const VectorUpTo3 innovation = (update.position_map_m - prediction.position_map_m)(axes);
+  const MatrixUpTo3 S = H * covariance * H.transpose() + admitted_covariance(update);
+  const ErrorRows HP = H * covariance;
+  const ErrorRows gain_transposed = S.llt().solve(HP);
+  state = boxplus(state, gain_transposed.transpose() * innovation);
+  covariance -= HP.transpose() * gain_transposed;
+  make_symmetric(covariance);
+}
+
+}  // namespace
+
+RowPrediction predict_row(const State& state,
+                          const Path& path,
+                          Nanoseconds fix_stamp_ns,
+                          const Vector3d& lever_arm_base_m) {
+  const PathNode& end = path.back();
+  const double age_s = to_seconds(end.stamp_ns - fix_stamp_ns);
+  const Pose then = path.at(fix_stamp_ns);
+  const Vector3d displacement_base_m =
+      end.T_odom_base.q.conjugate() * (then.p - end.T_odom_base.p + age_s * end.v_odom_mps);
+  const Vector3d lever_base_m = end.T_odom_base.q.conjugate() * (then.q * lever_arm_base_m);
+  const Vector3d offset_base_m = displacement_base_m + lever_base_m;
+  const Matrix3d R_odom_base = state.T_odom_base.q.toRotationMatrix();
+  const Matrix3d R_map_odom = from_yaw(state.T_map_odom.yaw_rad).toRotationMatrix();
+  const Vector3d antenna_odom_m =
+      state.T_odom_base.p - age_s * state.v_odom_mps + R_odom_base * offset_base_m;
+
+  RowPrediction row;
+  row.position_map_m = R_map_odom * antenna_odom_m + state.T_map_odom.p;
+  row.jacobian.setZero();
+  row.jacobian.middleCols<3>(error::kPosition) = R_map_odom;
+  row.jacobian.middleCols<3>(error::kRotation) = -R_map_odom * R_odom_base * hat(offset_base_m);
+  row.jacobian.middleCols<3>(error::kVelocity) = -age_s * R_map_odom;
+  row.jacobian.col(error::kYawMapOdom) = Vector3d::UnitZ().cross(R_map_odom * antenna_odom_m);
+  row.jacobian.middleCols<3>(error::kPositionMapOdom).setIdentity();
+  return row;
+}
+
+RowHistory::RowHistory(const RowsConfig& config, bool odom_is_fixed)
+    : config_(config), odom_is_fixed_(odom_is_fixed) {}
+
+void RowHistory::push(ScanRecord record) {
+  record.state = record.before_rows;
+  record.covariance = record.covariance_before_rows;
+  records_.push_back(std::move(record));
+  const Nanoseconds oldest_ns = newest().stamp_ns - from_seconds(config_.history_s);
+  while (records_.size() > 2 && records_.front().stamp_ns < oldest_ns) {
+    records_.pop_front();
+  }
+}
+
+RowVerdict RowHistory::check(const StateUpdate& update) const {
+  if (!is_usable(update)) {
+    return {RowOutcome::kRefused, "not_a_gaussian"};
+  }
+  if (records_.empty() || update.fix_stamp_ns > newest().stamp_ns) {
+    return waiting_.size() < static_cast<std::size_t>(config_.max_waiting)
+               ? RowVerdict{RowOutcome::kWaits, ""}
+               : RowVerdict{RowOutcome::kRefused, "too_many_waiting"};
+  }
+  // A path may begin before its scan's predecessor ended; the oldest record's path is all we have.
+  const ScanRecord& oldest = records_.front();
+  if (oldest.path.empty() || update.fix_stamp_ns < oldest.path.begin_ns()) {
+    return {RowOutcome::kRefused, "older_than_history"};
+  }
+  return {RowOutcome::kApplied, ""};
+}
+
+RowVerdict RowHistory::apply(const StateUpdate& update) {
+  const RowVerdict verdict = check(update);
+  if (verdict.outcome == RowOutcome::kWaits) {
+    waiting_.push_back(update);
+  }
+  if (verdict.outcome != RowOutcome::kApplied) {
+    return verdict;
+  }
+  const auto covering = std::find_if(records_.begin(), records_.end(), [&](const ScanRecord& r) {
+    return r.stamp_ns >= update.fix_stamp_ns;
+  });
+  const auto same_fix = [&](const StateUpdate& row) {
+    return row.fix_stamp_ns == update.fix_stamp_ns;
+  };
+  if (std::any_of(covering->rows.begin(), covering->rows.end(), same_fix)) {
+    return {RowOutcome::kRefused, "fix_already_used"};
+  }
+  const auto later = std::upper_bound(
+      covering->rows.begin(), covering->rows.end(), update, [](const auto& a, const auto& b) {
+        return a.fix_stamp_ns < b.fix_stamp_ns;
+      });
+  covering->rows.insert(later, update);
+  const auto anchor = static_cast<std::size_t>(covering - records_.begin());
+  if (update.mode == UpdateMode::kOverwrite) {
+    overwrite(anchor, update);
+  } else {
+    replay_from(anchor);
+  }
+  return verdict;
+}
+
+void RowHistory::apply_rows_of(ScanRecord& record, const Pose& T_odom_base_wanted) {
+  record.state = record.before_rows;
+  record.covariance = record.covariance_before_rows;
+  for (const StateUpdate& row : record.rows) {
+    if (row.mode == UpdateMode::kRows && !admitted_axes(row).empty()) {
+      condition_on(row,
+                   predict_row(record.state, record.path, row.fix_stamp_ns, row.lever_arm_base_m),
+                   record.state,
+                   record.covariance);
+    }
+  }
+  if (odom_is_fixed_) {
+    record.state = with_odom_moved(record.state, T_odom_base_wanted);
+  }
+}
+
+void RowHistory::replay_from(std::size_t first) {
+  State previous_old;
+  ErrorMatrix covariance_old;
+  for (std::size_t j = first; j < records_.size(); ++j) {
+    ScanRecord& record = records_[j];
+    const State old = record.state;
+    const ErrorMatrix old_covariance = record.covariance;
+    if (j > first) {
+      const ScanRecord& previous = records_[j - 1];
+      const ErrorMatrix& M = record.transition;
+      record.before_rows = boxplus(record.before_rows, M * boxminus(previous.state, previous_old));
+      if (odom_is_fixed_) {
+        record.before_rows = with_odom_moved(record.before_rows, old.T_odom_base);
+      }
+      record.covariance_before_rows += M * (previous.covariance - covariance_old) * M.transpose();
+      make_symmetric(record.covariance_before_rows);
+    }
+    apply_rows_of(record, old.T_odom_base);
+    previous_old = old;
+    covariance_old = old_covariance;
+  }
+}
+
+void RowHistory::overwrite(std::size_t anchor, const StateUpdate& update) {
+  const ScanRecord& at_fix = records_[anchor];
+  const Vector3d predicted_map_m =
+      predict_row(at_fix.state, at_fix.path, update.fix_stamp_ns, update.lever_arm_base_m)
+          .position_map_m;
+  Vector3d shift_map_m = Vector3d::Zero();
+  for (const int axis : admitted_axes(update)) {
+    shift_map_m[axis] = update.position_map_m[axis] - predicted_map_m[axis];
+  }
+  const Vector3d shift_odom_m = from_yaw(at_fix.state.T_map_odom.yaw_rad).conjugate() * shift_map_m;
+  for (std::size_t j = anchor; j < records_.size(); ++j) {
+    records_[j].before_rows.T_odom_base.p += shift_odom_m;
+    records_[j].state.T_odom_base.p += shift_odom_m;
+  }
+}
+
+std::vector<StateUpdate> RowHistory::take_covered() {
+  const auto uncovered =
+      std::stable_partition(waiting_.begin(), waiting_.end(), [&](const StateUpdate& update) {
+        return !records_.empty() && update.fix_stamp_ns <= newest().stamp_ns;
+      });
+  std::vector<StateUpdate> covered(waiting_.begin(), uncovered);
+  waiting_.erase(waiting_.begin(), uncovered);
+  std::stable_sort(covered.begin(), covered.end(), [](const auto& a, const auto& b) {
+    return a.fix_stamp_ns < b.fix_stamp_ns;
+  });
+  return covered;
+}
+
+void RowHistory::align(const Alignment& alignment) {
+  constexpr int kAt = error::kYawMapOdom;
+  const auto set = [&](State& state, ErrorMatrix& covariance) {
+    state.T_map_odom = alignment.T_map_odom;
+    covariance.middleRows<4>(kAt).setZero();
+    covariance.middleCols<4>(kAt).setZero();
+    covariance.block<4, 4>(kAt, kAt) = alignment.covariance;
+  };
+  for (ScanRecord& record : records_) {
+    set(record.before_rows, record.covariance_before_rows);
+    set(record.state, record.covariance);
+  }
+}
+
+}  // namespace trigpoint::lio_mapper

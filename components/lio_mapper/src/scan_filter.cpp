@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "scan_filter.hpp"
+
+#include "trigpoint/base/so3.hpp"
+
+#include "downsample.hpp"
+#include "scan_matcher.hpp"
+#include "undistortion.hpp"
+#include <Eigen/LU>
+
+namespace trigpoint::lio_mapper {
+
+using Eigen::Matrix3d;
+using Eigen::Matrix4d;
+using Eigen::Vector3d;
+
+namespace {
+
+/// Between two samples farther apart the trapezoid is divided.
+constexpr double kLongestStep_s = 0.02;
+/// Less motion between two scans is jitter of the estimate.
+constexpr double kLeastMotion_m = 0.005;
+/// A scan is put into the map unmatched only while its pose relative to the map is this certain.
+constexpr double kMapSigma_m = 0.3;
+
+PointCloud transformed(const PointCloud& points, const Pose& T) {
+  const Eigen::Matrix3f R = T.q.toRotationMatrix().cast<float>();
+  const Eigen::Vector3f t = T.p.cast<float>();
+  PointCloud moved;
+  moved.reserve(points.size());
+  for (const PointXyzi& point : points) {
+    const Eigen::Vector3f p = R * point.position() + t;
+    moved.push_back({p.x(), p.y(), p.z(), point.intensity});
+  }
+  return moved;
+}
+
+IterationLimits limits_of(const MatchingConfig& config) {
+  return {config.max_iterations,
+          config.converged_position_m,
+          config.converged_rotation_rad,
+          static_cast<std::size_t>(config.min_matches)};
+}
+
+/// Jacobian of the pose error of T * pose (position, heading) by the error of T = (yaw, x, y, z).
+Eigen::Matrix<double, 6, 4> pose_by_transform(double yaw_rad, const Vector3d& p_odom_m) {
+  Eigen::Matrix<double, 6, 4> jacobian = Eigen::Matrix<double, 6, 4>::Zero();
+  jacobian.topLeftCorner<3, 1>() = Vector3d::UnitZ().cross(from_yaw(yaw_rad) * p_odom_m);
+  jacobian.topRightCorner<3, 3>().setIdentity();
+  jacobian(5, 0) = 1.0;
+  return jacobian;
+}
+
+}  // namespace
+
+Matrix4d drift_noise(const DriftConfig& drift,
+                     double distance_m,
+                     double yaw_rad,
+                     const Vector3d& p_odom_m) {
+  const double position2 = drift.position_sigma_m_sqrtm * drift.position_sigma_m_sqrtm * distance_m;
+  const double yaw2 = drift.yaw_sigma_rad_sqrtm * drift.yaw_sigma_rad_sqrtm * distance_m;
+  Eigen::Vector4d turn = Eigen::Vector4d::UnitX();
+  turn.tail<3>() = -Vector3d::UnitZ().cross(from_yaw(yaw_rad) * p_odom_m);
+  Matrix4d noise = yaw2 * turn * turn.transpose();
+  noise.bottomRightCorner<3, 3>().diagonal().array() += position2;
+  return noise;
+}
+
+ScanFilter::ScanFilter(const Config& config, const Pose& T_base_lidar, const InitialState& initial)
+    : config_(config),
+      T_base_lidar_(T_base_lidar),
+      initial_(initial),
+      map_(make_surfel_map(config.local_map.surfel)),
+      history_(config.rows) {}
+
+Nanoseconds ScanFilter::stamp_ns() const {
+  return history_.empty() ? initial_.stamp_ns : history_.newest().stamp_ns;
+}
+
+const State& ScanFilter::state() const {
+  return history_.empty() ? initial_.state : history_.newest().state;
+}
+
+const ErrorMatrix& ScanFilter::covariance() const {
+  return history_.empty() ? initial_.covariance : history_.newest().covariance;
+}
+
+ScanFilter::Prediction ScanFilter::predict(const Sweep& sweep, const ImuBuffer& imu) const {
+  Prediction prediction{state(), covariance()};
+  const auto steps = imu.steps_between(stamp_ns(), sweep.end_ns, kLongestStep_s);
+  const bool gap = imu.longest_gap_s(stamp_ns(), sweep.end_ns) > config_.imu.max_gap_s;
+  const double noise_factor = gap ? config_.imu.gap_noise_factor : 1.0;
+  PathNode node{stamp_ns(), state().T_odom_base, state().v_odom_mps};
+  for (const InertialStep& step : steps) {
+    const StepJacobian jacobian = step_jacobian(prediction.state, step);
+    const State next = propagate(prediction.state, step);
+    const double dt_s = step.duration_s();
+    node.acceleration_odom_mps2 = (next.v_odom_mps - prediction.state.v_odom_mps) / dt_s;
+    node.angular_radps =
+        0.5 * (step.begin.gyro_radps + step.end.gyro_radps) - prediction.state.gyro_bias_radps;
+    prediction.path.push_back(node);
+    propagate_covariance(jacobian, config_.imu, noise_factor, prediction.covariance);
+    apply_transition(jacobian, prediction.transition);
+    prediction.state = next;
+    node.stamp_ns = step.end.stamp_ns;
+    node.T_odom_base = next.T_odom_base;
+    node.v_odom_mps = next.v_odom_mps;
+  }
+  prediction.path.push_back(node);
+  return prediction;
+}
+
+void ScanFilter::add_drift(Prediction& prediction) {
+  const double moved_m = (prediction.state.T_odom_base.p - state().T_odom_base.p).norm();
+  if (moved_m < kLeastMotion_m) {
+    return;
+  }
+  distance_m_ += moved_m;
+  const Vector3d& p = prediction.state.T_odom_base.p;
+  drift_covariance_ += drift_noise(config_.drift, moved_m, 0.0, p);
+  if (aligned_) {
+    prediction.covariance.block<4, 4>(error::kYawMapOdom, error::kYawMapOdom) +=
+        drift_noise(config_.drift, moved_m, prediction.state.T_map_odom.yaw_rad, p);
+  }
+}
+
+UpdateResult ScanFilter::match(const Prediction& prediction,
+                               const PointCloud& thinned_base,
+                               ScanOutcome& outcome) {
+  ScanMatcher matcher(thinned_base, *map_, T_base_lidar_.p, config_.matching);
+  UpdateResult result = iterated_update(
+      prediction.state,
+      prediction.covariance,
+      [&](const Pose& T_odom_base) { return matcher.linearise(T_odom_base); },
+      limits_of(config_.matching));
+  outcome.used = result.used;
+  outcome.matches = result.count;
+  outcome.iterations = result.iterations;
+  outcome.observability = result.observability;
+  outcome.share_within_10_cm = matcher.share_within(0.1);
+  return result;
+}
+
+ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu) {
+  Prediction prediction = predict(sweep, imu);
+  add_drift(prediction);
+
+  ScanOutcome outcome;
+  outcome.points_base = undistort(sweep, prediction.path, T_base_lidar_);
+  outcome.thinned_base = downsample(outcome.points_base, config_.matching.voxel_m);
+  outcome.points = outcome.thinned_base.size();
+  outcome.first = map_->empty();
+
+  ScanRecord record;
+  record.stamp_ns = sweep.end_ns;
+  record.before_rows = prediction.state;
+  record.covariance_before_rows = prediction.covariance;
+  record.transition = prediction.transition;
+  if (outcome.first) {
+    outcome.used = outcome.points >= static_cast<std::size_t>(config_.matching.min_matches);
+  } else {
+    const UpdateResult result = match(prediction, outcome.thinned_base, outcome);
+    record.before_rows = result.state;
+    record.covariance_before_rows = result.covariance;
+    record.transition = result.transition * prediction.transition;
+  }
+  record.path = std::move(prediction.path);
+  history_.push(std::move(record));
+  return outcome;
+}
+
+void ScanFilter::insert(const ScanOutcome& outcome) {
+  const Vector3d& p = state().T_odom_base.p;
+  const double sigma2 = covariance().diagonal().head<3>().maxCoeff();
+  if (outcome.used || sigma2 < kMapSigma_m * kMapSigma_m) {
+    map_->insert(transformed(outcome.thinned_base, state().T_odom_base));
+  }
+  if ((p - pruned_at_m_).norm() > config_.local_map.prune_every_m) {
+    map_->prune(p, config_.local_map.half_side_m);
+    pruned_at_m_ = p;
+  }
+}
+
+void ScanFilter::align(const Alignment& alignment) {
+  history_.align(alignment);
+  aligned_ = true;
+}
+
+RowVerdict ScanFilter::apply(const StateUpdate& update) {
+  if (!aligned_) {
+    return {RowOutcome::kRefused, "not_aligned"};
+  }
+  return history_.apply(update);
+}
+
+Matrix6d ScanFilter::pose_covariance_in_local_map() const {
+  Matrix6d to_odom = Matrix6d::Identity();
+  to_odom.bottomRightCorner<3, 3>() = state().T_odom_base.q.toRotationMatrix();
+  return to_odom * covariance().topLeftCorner<6, 6>() * to_odom.transpose();
+}
+
+Matrix6d ScanFilter::pose_covariance() const {
+  const auto jacobian = pose_by_transform(0.0, state().T_odom_base.p);
+  return pose_covariance_in_local_map() + jacobian * drift_covariance_ * jacobian.transpose();
+}
+
+}  // namespace trigpoint::lio_mapper

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#pragma once
+
+#include "trigpoint/base/measurements.hpp"
+#include "trigpoint/lio_mapper/config.hpp"
+
+#include "imu_buffer.hpp"
+#include "iterated_update.hpp"
+#include "local_map.hpp"
+#include "row_history.hpp"
+#include "sweep.hpp"
+#include <Eigen/Core>
+
+#include <memory>
+
+namespace trigpoint::lio_mapper {
+
+/// Where the filter begins.
+struct InitialState {
+  Nanoseconds stamp_ns{0};
+  State state;
+  ErrorMatrix covariance{ErrorMatrix::Zero()};
+};
+
+/// What one sweep did.
+struct ScanOutcome {
+  bool first{false};      ///< began the map; nothing to match
+  bool used{false};       ///< matched, or first
+  std::size_t points{0};  ///< after thinning
+  std::size_t matches{0};
+  int iterations{0};
+  double share_within_10_cm{0.0};  ///< of the thinned points, from their planes
+  std::array<double, 6> observability{};
+  PointCloud points_base;   ///< undistorted, all
+  PointCloud thinned_base;  ///< undistorted, one a voxel
+};
+
+/// The method, one call a step: propagate, undistort, thin, match and update, apply GPS rows,
+/// insert. One odom epoch; knows nothing of start-up, waiting or reporting.
+class ScanFilter {
+ public:
+  ScanFilter(const Config& config, const Pose& T_base_lidar, const InitialState& initial);
+
+  /// `imu` covers the sweep's end.
+  ScanOutcome process(const Sweep& sweep, const ImuBuffer& imu);
+
+  Nanoseconds stamp_ns() const;
+  const State& state() const;
+  const ErrorMatrix& covariance() const;
+
+  bool aligned() const { return aligned_; }
+
+  double distance_m() const { return distance_m_; }
+
+  const LocalMap& map() const { return *map_; }
+
+  void align(const Alignment& alignment);
+  RowVerdict apply(const StateUpdate& update);
+
+  std::vector<StateUpdate> take_covered() { return history_.take_covered(); }
+
+  std::size_t rows_waiting() const { return history_.waiting(); }
+
+  /// Of base_link in odom, in ROS order: relative to the local map, plus what odom itself may have
+  /// drifted since the epoch began.
+  Matrix6d pose_covariance() const;
+  /// Only relative to the local map, in ROS order.
+  Matrix6d pose_covariance_in_local_map() const;
+
+  /// Called once between process() and the next process(): rows that wait count before the scan
+  /// enters the map.
+  void insert(const ScanOutcome& outcome);
+
+ private:
+  struct Prediction {
+    State state;
+    ErrorMatrix covariance;
+    ErrorMatrix transition{ErrorMatrix::Identity()};
+    Path path{};
+  };
+
+  Prediction predict(const Sweep& sweep, const ImuBuffer& imu) const;
+  void add_drift(Prediction& prediction);
+  UpdateResult match(const Prediction& prediction,
+                     const PointCloud& thinned_base,
+                     ScanOutcome& outcome);
+
+  Config config_;
+  Pose T_base_lidar_;
+  InitialState initial_;
+  std::unique_ptr<LocalMap> map_;
+  RowHistory history_;
+  bool aligned_{false};
+  double distance_m_{0.0};
+  Eigen::Vector3d pruned_at_m_{Eigen::Vector3d::Zero()};
+  Eigen::Matrix4d drift_covariance_{Eigen::Matrix4d::Zero()};  ///< of odom: yaw, x, y, z
+};
+
+/// Covariance that a random walk of heading and position at `p_odom_m` adds to a transform
+/// (yaw, x, y, z) from odom into a frame turned by `yaw_rad`: the heading turns about the robot,
+/// not about the origin of odom.
+Eigen::Matrix4d drift_noise(const DriftConfig& drift,
+                            double distance_m,
+                            double yaw_rad,
+                            const Eigen::Vector3d& p_odom_m);
+
+}  // namespace trigpoint::lio_mapper

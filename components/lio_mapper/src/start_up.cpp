@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "start_up.hpp"
+
+#include "trigpoint/base/so3.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace trigpoint::lio_mapper {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+namespace {
+
+constexpr double kRestGyro_radps = 0.03;
+constexpr double kRestGyroSpread_radps = 0.03;
+constexpr double kRestForceChange_mps2 = 0.1;
+/// A speed must fit this much better (share of points) than standing still to be believed.
+constexpr double kClearlyBetter = 0.03;
+constexpr double kBackwardSpeed_mps = 4.0;
+constexpr double kLongestStep_s = 0.02;
+constexpr double kTiltMoving_rad = 0.1;
+constexpr double kTiltRelevelled_rad = 5e-3;
+constexpr double kVelocityMoving_mps = 0.5;
+constexpr int kRefinements = 2;
+
+std::string sentence(const char* format, double a, double b = 0.0, double c = 0.0) {
+  char text[400];
+  std::snprintf(text, sizeof text, format, a, b, c);
+  return text;
+}
+
+Eigen::Quaterniond without_yaw(const Eigen::Quaterniond& q) {
+  return (from_yaw(-yaw_of(q)) * q).normalized();
+}
+
+/// The same start with another velocity (base axes).
+InitialState with_velocity(InitialState initial, const Vector3d& v_base_mps, double sigma_mps) {
+  initial.state.v_odom_mps = initial.state.T_odom_base.q * v_base_mps;
+  initial.covariance.block<3, 3>(error::kVelocity, error::kVelocity) =
+      sigma_mps * sigma_mps * Matrix3d::Identity();
+  return initial;
+}
+
+struct Trial {
+  double share{0.0};
+  Vector3d v_base_mps{Vector3d::Zero()};  ///< at the start, as the second scan corrected it
+};
+
+/// Runs the first two sweeps from `initial` and tells how well the second fits the first.
+Trial try_start(const Config& config,
+                const Pose& T_base_lidar,
+                const ImuBuffer& imu,
+                const std::deque<Sweep>& sweeps,
+                const InitialState& initial) {
+  ScanFilter filter(config, T_base_lidar, initial);
+  filter.insert(filter.process(sweeps[0], imu));
+  State unaided = filter.state();
+  for (const InertialStep& step :
+       imu.steps_between(filter.stamp_ns(), sweeps[1].end_ns, kLongestStep_s)) {
+    unaided = propagate(unaided, step);
+  }
+  const ScanOutcome outcome = filter.process(sweeps[1], imu);
+  const Vector3d correction_mps = filter.state().v_odom_mps - unaided.v_odom_mps;
+  return {outcome.used ? outcome.share_within_10_cm : 0.0,
+          initial.state.T_odom_base.q.conjugate() * (initial.state.v_odom_mps + correction_mps)};
+}
+
+/// First velocity in base axes: zero unless a forward speed explains the second sweep clearly
+/// better.
+Vector3d find_velocity(const Config& config,
+                       const Pose& T_base_lidar,
+                       const ImuBuffer& imu,
+                       const std::deque<Sweep>& sweeps,
+                       const InitialState& initial) {
+  const double step_mps = config.start.speed_step_mps;
+  const auto attempt = [&](const Vector3d& v_base_mps) {
+    return try_start(
+        config, T_base_lidar, imu, sweeps, with_velocity(initial, v_base_mps, step_mps));
+  };
+  const Trial standing = attempt(Vector3d::Zero());
+  Trial best = standing;
+  for (double speed = -kBackwardSpeed_mps; speed <= config.start.max_speed_mps; speed += step_mps) {
+    const Trial trial = attempt(speed * Vector3d::UnitX());
+    if (trial.share > best.share) {
+      best = trial;
+    }
+  }
+  if (best.share < standing.share + kClearlyBetter) {
+    best = standing;
+  }
+  for (int i = 0; i < kRefinements; ++i) {
+    best = attempt(best.v_base_mps);
+  }
+  return best.v_base_mps;
+}
+
+/// Gravity (base axes at the start) after a trial run over all sweeps that the IMU covers.
+Vector3d gravity_from_trial(const Config& config,
+                            const Pose& T_base_lidar,
+                            const ImuBuffer& imu,
+                            const std::deque<Sweep>& sweeps,
+                            const InitialState& initial) {
+  ScanFilter filter(config, T_base_lidar, initial);
+  for (const Sweep& sweep : sweeps) {
+    if (sweep.end_ns <= imu.newest_ns()) {
+      filter.insert(filter.process(sweep, imu));
+    }
+  }
+  return initial.state.T_odom_base.q.conjugate() * filter.state().gravity_odom_mps2;
+}
+
+Nanoseconds start_stamp(const ImuBuffer& imu, const std::deque<Sweep>& sweeps) {
+  return std::max(imu.oldest_ns(), sweeps.front().begin_ns);
+}
+
+}  // namespace
+
+ImuSummary summarize(const ImuBuffer& imu, Nanoseconds from_ns, Nanoseconds to_ns) {
+  ImuSummary summary;
+  const auto steps = imu.steps_between(from_ns, to_ns, kLongestStep_s);
+  summary.count = steps.size();
+  if (steps.empty()) {
+    return summary;
+  }
+  Eigen::Quaterniond q_begin_base = Eigen::Quaterniond::Identity();
+  std::array<Vector3d, 2> half_sums{Vector3d::Zero(), Vector3d::Zero()};
+  std::array<double, 2> half_s{};
+  Vector3d turned_rad = Vector3d::Zero();
+  double square = 0.0;
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    const double dt_s = steps[i].duration_s();
+    const Vector3d gyro = 0.5 * (steps[i].begin.gyro_radps + steps[i].end.gyro_radps);
+    const std::size_t half = 2 * i < steps.size() ? 0 : 1;
+    half_sums[half] +=
+        q_begin_base * (0.5 * dt_s * (steps[i].begin.accel_mps2 + steps[i].end.accel_mps2));
+    half_s[half] += dt_s;
+    turned_rad += dt_s * gyro;
+    square += dt_s * gyro.squaredNorm();
+    q_begin_base = (q_begin_base * so3_exp(gyro * dt_s)).normalized();
+  }
+  const double duration_s = half_s[0] + half_s[1];
+  summary.mean_gyro_radps = turned_rad / duration_s;
+  summary.mean_force_mps2 = q_begin_base.conjugate() * ((half_sums[0] + half_sums[1]) / duration_s);
+  if (half_s[1] > 0.0) {
+    summary.force_change_mps2 = (half_sums[1] / half_s[1] - half_sums[0] / half_s[0]).norm();
+  }
+  summary.gyro_spread_radps =
+      std::sqrt(std::max(0.0, square / duration_s - summary.mean_gyro_radps.squaredNorm()));
+  return summary;
+}
+
+std::optional<Event> check_specific_force(const Vector3d& force_mps2, Nanoseconds stamp_ns) {
+  const double norm = force_mps2.norm();
+  if (norm > 0.8 && norm < 1.2) {
+    return Event{Severity::kError,
+                 stamp_ns,
+                 "imu_in_g",
+                 sentence("mean specific force is %.3f, expected %.2f m/s^2: the accelerometer "
+                          "seems to speak in g; multiply it by 9.80665",
+                          norm,
+                          kStandardGravity_mps2)};
+  }
+  if (norm < 8.5 || norm > 11.5) {
+    return Event{Severity::kError,
+                 stamp_ns,
+                 "imu_force_implausible",
+                 sentence("mean specific force is %.3f m/s^2, expected about %.2f: check the "
+                          "accelerometer's unit and whether gravity was taken out",
+                          norm,
+                          kStandardGravity_mps2)};
+  }
+  if (force_mps2.z() < 0.0) {
+    return Event{Severity::kError,
+                 stamp_ns,
+                 "imu_upside_down",
+                 sentence("specific force along base_link's z is %.2f m/s^2 at the start, expected "
+                          "%+.2f: the IMU is upside down; set robot.imu_roll_pitch_yaw_base_rad "
+                          "(for a half turn about x: 3.14159, 0, 0)",
+                          force_mps2.z(),
+                          kStandardGravity_mps2)};
+  }
+  return std::nullopt;
+}
+
+bool looks_at_rest(const ImuSummary& summary) {
+  return summary.mean_gyro_radps.norm() < kRestGyro_radps &&
+         summary.gyro_spread_radps < kRestGyroSpread_radps &&
+         summary.force_change_mps2 < kRestForceChange_mps2;
+}
+
+InitialState level(const Vector3d& force_base_mps2,
+                   Nanoseconds stamp_ns,
+                   const ImuConfig& imu,
+                   const StartSigmas& sigmas) {
+  InitialState initial;
+  initial.stamp_ns = stamp_ns;
+  State& state = initial.state;
+  state.T_odom_base.q = without_yaw(rotation_between(force_base_mps2, Vector3d::UnitZ()));
+  state.gravity_odom_mps2 = {0.0, 0.0, -kStandardGravity_mps2};
+
+  constexpr double kByDefinition = 1e-4;
+  ErrorMatrix& P = initial.covariance;
+  const auto set = [&](int at, double sigma) {
+    P.block<3, 3>(at, at) = sigma * sigma * Matrix3d::Identity();
+  };
+  set(error::kPosition, kByDefinition);
+  set(error::kRotation, kByDefinition);
+  set(error::kVelocity, sigmas.velocity_mps);
+  set(error::kGyroBias, sigmas.gyro_bias_radps);
+  set(error::kAccelBias, imu.initial_accel_bias_sigma_mps2);
+  // dg = R db, and dg = D e with D = -[g]x B, D^T D = |g|^2 I, so e = D^T R db / |g|^2.
+  const Eigen::Matrix<double, 3, 2> D =
+      -hat(state.gravity_odom_mps2) * gravity_tangent(state.gravity_odom_mps2);
+  const Eigen::Matrix<double, 2, 3> by_bias = D.transpose() *
+                                              state.T_odom_base.q.toRotationMatrix() /
+                                              (kStandardGravity_mps2 * kStandardGravity_mps2);
+  const double bias2 = imu.initial_accel_bias_sigma_mps2 * imu.initial_accel_bias_sigma_mps2;
+  P.block<2, 2>(error::kGravity, error::kGravity) =
+      bias2 * by_bias * by_bias.transpose() +
+      sigmas.tilt_rad * sigmas.tilt_rad * Eigen::Matrix2d::Identity();
+  P.block<2, 3>(error::kGravity, error::kAccelBias) = bias2 * by_bias;
+  P.block<3, 2>(error::kAccelBias, error::kGravity) = bias2 * by_bias.transpose();
+  return initial;
+}
+
+bool can_start(const StartConfig& config, const ImuBuffer& imu, const std::deque<Sweep>& sweeps) {
+  if (imu.empty() || sweeps.size() < 2 || imu.newest_ns() < sweeps[1].end_ns) {
+    return false;
+  }
+  const Nanoseconds window_ns = from_seconds(config.window_s);
+  const Nanoseconds from_ns = std::max(imu.oldest_ns(), sweeps.front().begin_ns - window_ns);
+  return imu.newest_ns() - from_ns >= window_ns;
+}
+
+StartResult start(const Config& config,
+                  const Pose& T_base_lidar,
+                  const ImuBuffer& imu,
+                  const std::deque<Sweep>& sweeps) {
+  StartResult result;
+  const Nanoseconds stamp_ns = start_stamp(imu, sweeps);
+  const Nanoseconds window_ns = from_seconds(config.start.window_s);
+  const Nanoseconds from_ns = std::max(imu.oldest_ns(), stamp_ns - window_ns);
+  const Nanoseconds to_ns = std::min(imu.newest_ns(), from_ns + window_ns);
+  const ImuSummary summary = summarize(imu, from_ns, to_ns);
+  // The summary is in base axes at the window's end; the start is at stamp_ns.
+  const auto turn = [&](Nanoseconds a, Nanoseconds b) {
+    Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
+    for (const InertialStep& step : imu.steps_between(a, b, kLongestStep_s)) {
+      q = q * so3_exp(0.5 * step.duration_s() * (step.begin.gyro_radps + step.end.gyro_radps));
+    }
+    return q.normalized();
+  };
+  const Vector3d force = turn(stamp_ns, to_ns) * summary.mean_force_mps2;
+  result.trouble = check_specific_force(force, stamp_ns);
+  if (result.trouble) {
+    return result;
+  }
+  result.initial =
+      level(force,
+            stamp_ns,
+            config.imu,
+            {kTiltMoving_rad, kVelocityMoving_mps, config.imu.initial_gyro_bias_sigma_radps});
+  Vector3d v_base = Vector3d::Zero();
+  if (sweeps.size() >= 2) {
+    v_base = find_velocity(config, T_base_lidar, imu, sweeps, result.initial);
+  }
+  result.speed_mps = v_base.norm();
+  result.at_rest = looks_at_rest(summary) && result.speed_mps < config.start.rest_speed_mps;
+  if (result.at_rest) {
+    result.initial = level(force, stamp_ns, config.imu, {});
+    result.initial.state.gyro_bias_radps = summary.mean_gyro_radps;
+    result.initial.state.accel_bias_mps2 =
+        (force.norm() - kStandardGravity_mps2) * force.normalized();
+    return result;
+  }
+  const Vector3d gravity =
+      gravity_from_trial(config,
+                         T_base_lidar,
+                         imu,
+                         sweeps,
+                         with_velocity(result.initial, v_base, kVelocityMoving_mps));
+  result.initial =
+      level(-gravity,
+            stamp_ns,
+            config.imu,
+            {kTiltRelevelled_rad, kVelocityMoving_mps, config.imu.initial_gyro_bias_sigma_radps});
+  result.initial = with_velocity(result.initial, v_base, kVelocityMoving_mps);
+  return result;
+}
+
+}  // namespace trigpoint::lio_mapper
