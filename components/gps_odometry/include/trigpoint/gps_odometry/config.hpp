@@ -15,7 +15,60 @@ namespace trigpoint::gps_odometry {
 
 /// The only defaults of gps_odometry; every field is described (unit, rule) in src/config.cpp.
 struct Config {
-  // Filled in by the implementer of the core.
+  // What is published, and when.
+  double publish_rate_hz{50.0};
+  double dead_reckoning_after_s{1.0};
+  double stale_after_s{30.0};
+
+  // Datum. The three numbers come together or not at all (NaN = not given).
+  double datum_latitude_deg;
+  double datum_longitude_deg;
+  double datum_height_m;
+  double datum_wait_s{2.0};
+  std::int64_t datum_fixes{10};
+
+  // Fix checks.
+  double future_limit_s{0.1};
+  double rewind_s{1.0};
+  double highest_speed_mps{60.0};
+  double recovery_s{5.0};
+  double gate_probability{0.999};
+  std::int64_t frozen_fixes{3};
+
+  // What a fix is worth: sigma of a class that sends no covariance, scale of reported sigma, share
+  // of its variance that is correlated in time and never averages out, floors of what is published.
+  double default_sigma_code_m{3.0};
+  double default_sigma_sbas_m{1.5};
+  double default_sigma_float_m{0.5};
+  double default_sigma_fixed_m{0.05};
+  double fix_sigma_scale{2.0};
+  double fix_correlated_share{0.7};
+  double correlated_decay_s{5.0};
+  double floor_sigma_fixed_m{0.02};
+  double floor_sigma_other_m{0.05};
+
+  // IMU and motion model.
+  double gyro_sigma_radps{0.01};
+  double accel_sigma_mps2{0.2};
+  double gyro_bias_sigma_radps{0.005};
+  double gyro_bias_rest_sigma_radps{0.0005};
+  double gyro_bias_horizon_s{20.0};
+  double accel_bias_sigma_mps2{0.05};
+  double accel_bias_horizon_s{10.0};
+  double attitude_noise_rad_sqrts{0.002};
+  double rate_noise_radps_sqrts{1.0};
+  double acceleration_sigma_mps2{1.5};
+  double acceleration_tau_s{2.0};
+  double longest_step_s{0.02};
+
+  // Heading from motion.
+  double heading_sigma_rad{0.1};
+  double heading_baseline_m{1.5};
+  double heading_speed_mps{0.4};
+  double heading_converged_rad{0.17};
+  double heading_lost_rad{0.8};
+
+  Config();
 };
 
 void describe(Config& config, ConfigFields& fields);

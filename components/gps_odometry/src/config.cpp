@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "trigpoint/gps_odometry/config.hpp"
+
+#include "trigpoint/base/config.hpp"
+
+#include <limits>
+
+namespace trigpoint::gps_odometry {
+
+namespace {
+
+constexpr Bounds kShare{0.0, 1.0};
+
+void describe_output(Config& c, ConfigFields& f) {
+  f.number("publish_rate_hz", c.publish_rate_hz, "Highest rate of gps/odometry (Hz)", kPositive);
+  f.number("dead_reckoning_after_s",
+           c.dead_reckoning_after_s,
+           "Health DEAD_RECKONING when the last accepted fix is older (s); at least two and a half "
+           "fix intervals",
+           kPositive);
+  f.number("stale_after_s",
+           c.stale_after_s,
+           "Health STALE when the last accepted fix is older (s)",
+           kPositive);
+}
+
+void describe_datum(Config& c, ConfigFields& f) {
+  f.number("datum_latitude_deg",
+           c.datum_latitude_deg,
+           "Datum; .nan leaves it to the bus, and then to an election");
+  f.number("datum_longitude_deg", c.datum_longitude_deg, "Datum, with latitude and height");
+  f.number("datum_height_m", c.datum_height_m, "Datum, above the WGS 84 ellipsoid");
+  f.number("datum_wait_s",
+           c.datum_wait_s,
+           "Data time to wait for somebody else's datum before electing one (s)",
+           kNotNegative);
+  f.integer("datum_fixes", c.datum_fixes, "Fixes whose mean an elected datum is", {1, 1000});
+}
+
+void describe_checks(Config& c, ConfigFields& f) {
+  f.number("future_limit_s",
+           c.future_limit_s,
+           "A fix stamped further ahead of the newest IMU sample is refused (s)",
+           kNotNegative);
+  f.number("rewind_s",
+           c.rewind_s,
+           "Length of the rewind buffer: older fixes are refused (s)",
+           {0.05, 10.0});
+  f.number("highest_speed_mps",
+           c.highest_speed_mps,
+           "Fixes that imply more are refused as teleports (m/s)",
+           kPositive);
+  f.number("recovery_s",
+           c.recovery_s,
+           "After refusing fixes that agree with each other for this long the position is set to "
+           "them (s)",
+           kPositive);
+  f.number("gate_probability",
+           c.gate_probability,
+           "Chi-square gate: share of good fixes that pass, horizontal (2 degrees of freedom) and "
+           "vertical (1)",
+           {0.9, 0.999999});
+  f.integer("frozen_fixes",
+            c.frozen_fixes,
+            "Identical positions in a row that are believed while the filter moves",
+            {1, 1000});
+}
+
+void describe_fix(Config& c, ConfigFields& f) {
+  f.number("default_sigma_code_m",
+           c.default_sigma_code_m,
+           "Horizontal sigma of a plain fix without covariance (m); vertical twice that",
+           kPositive);
+  f.number("default_sigma_sbas_m", c.default_sigma_sbas_m, "The same, status SBAS", kPositive);
+  f.number("default_sigma_float_m",
+           c.default_sigma_float_m,
+           "The same, status GBAS (RTK, fixed or float unknown)",
+           kPositive);
+  f.number(
+      "default_sigma_fixed_m",
+      c.default_sigma_fixed_m,
+      "Horizontal sigma below which a fix counts as RTK fixed (m); below ten times that as float",
+      kPositive);
+  f.number("fix_sigma_scale",
+           c.fix_sigma_scale,
+           "Receivers are optimistic: reported sigma is multiplied by this",
+           kPositive);
+  f.number("fix_correlated_share",
+           c.fix_correlated_share,
+           "Share of a fix's variance that is correlated in time; it is added to what is published",
+           kShare);
+  f.number("correlated_decay_s",
+           c.correlated_decay_s,
+           "Time in which that share follows fixes that became better (peak hold)",
+           kPositive);
+  f.number("floor_sigma_fixed_m",
+           c.floor_sigma_fixed_m,
+           "Least published horizontal sigma in class fixed (m); vertical twice that",
+           kPositive);
+  f.number("floor_sigma_other_m",
+           c.floor_sigma_other_m,
+           "Least published horizontal sigma in other classes (m); vertical twice that",
+           kPositive);
+}
+
+void describe_imu(Config& c, ConfigFields& f) {
+  f.number("gyro_sigma_radps", c.gyro_sigma_radps, "Noise of a gyro sample", kPositive);
+  f.number("accel_sigma_mps2",
+           c.accel_sigma_mps2,
+           "Noise of an accelerometer sample, vibration included",
+           kPositive);
+  f.number("gyro_bias_sigma_radps",
+           c.gyro_bias_sigma_radps,
+           "Gyro bias before the first rest",
+           kPositive);
+  f.number("gyro_bias_rest_sigma_radps",
+           c.gyro_bias_rest_sigma_radps,
+           "Gyro bias left after it was averaged at rest",
+           kPositive);
+  f.number("gyro_bias_horizon_s",
+           c.gyro_bias_horizon_s,
+           "Time for which the attitude noise stands in for the missing gyro bias state",
+           kPositive);
+  f.number("accel_bias_sigma_mps2", c.accel_bias_sigma_mps2, "Accelerometer bias", kPositive);
+  f.number("accel_bias_horizon_s",
+           c.accel_bias_horizon_s,
+           "Time for which the velocity noise stands in for the missing accelerometer bias state",
+           kPositive);
+  f.number("attitude_noise_rad_sqrts",
+           c.attitude_noise_rad_sqrts,
+           "Random walk of the attitude beyond the gyro's noise (rad/sqrt(s))",
+           kPositive);
+  f.number("rate_noise_radps_sqrts",
+           c.rate_noise_radps_sqrts,
+           "Random walk of the body rates (rad/s/sqrt(s))",
+           kPositive);
+  f.number("acceleration_sigma_mps2",
+           c.acceleration_sigma_mps2,
+           "Manoeuvres: standard deviation of the change of body velocity per second",
+           kPositive);
+  f.number(
+      "acceleration_tau_s", c.acceleration_tau_s, "Manoeuvres: their correlation time", kPositive);
+  f.number("longest_step_s",
+           c.longest_step_s,
+           "Prediction is cut into steps no longer than this (s)",
+           {0.001, 0.05});
+}
+
+void describe_heading(Config& c, ConfigFields& f) {
+  f.number("heading_sigma_rad",
+           c.heading_sigma_rad,
+           "Heading is taken from motion once it is this certain",
+           kPositive);
+  f.number("heading_baseline_m",
+           c.heading_baseline_m,
+           "And not before this distance was driven",
+           kPositive);
+  f.number(
+      "heading_speed_mps", c.heading_speed_mps, "And not slower than this on average", kPositive);
+  f.number("heading_converged_rad",
+           c.heading_converged_rad,
+           "Health is DEGRADED while the heading's sigma is larger",
+           kPositive);
+  f.number("heading_lost_rad",
+           c.heading_lost_rad,
+           "Heading is searched anew when its sigma became larger (after a long outage)",
+           kPositive);
+}
+
+}  // namespace
+
+Config::Config()
+    : datum_latitude_deg(std::numeric_limits<double>::quiet_NaN()),
+      datum_longitude_deg(std::numeric_limits<double>::quiet_NaN()),
+      datum_height_m(std::numeric_limits<double>::quiet_NaN()) {}
+
+void describe(Config& config, ConfigFields& fields) {
+  describe_output(config, fields);
+  describe_datum(config, fields);
+  describe_checks(config, fields);
+  describe_fix(config, fields);
+  describe_imu(config, fields);
+  describe_heading(config, fields);
+}
+
+}  // namespace trigpoint::gps_odometry

@@ -1,0 +1,390 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "trigpoint/gps_odometry/gps_odometry.hpp"
+
+#include "trigpoint/base/config.hpp"
+#include "trigpoint/base/so3.hpp"
+#include "trigpoint/geodesy/local_frame.hpp"
+
+#include "counters.hpp"
+#include "datum_election.hpp"
+#include "fix_checks.hpp"
+#include "imu_checks.hpp"
+#include "rewind.hpp"
+#include "status.hpp"
+#include "track.hpp"
+
+#include <cmath>
+
+namespace trigpoint::gps_odometry {
+
+namespace {
+
+constexpr const char* kSource = "ekf15";
+constexpr Nanoseconds kStatusInterval_ns = kNanosecondsPerSecond;
+// Fixes ahead of the IMU one after another mean that the IMU has stopped.
+constexpr int kSilentImuFixes = 3;
+constexpr double kFrozenSpeed_mps = 0.5;
+
+std::optional<Datum> configured_datum(const Config& config) {
+  const int given = static_cast<int>(!std::isnan(config.datum_latitude_deg)) +
+                    static_cast<int>(!std::isnan(config.datum_longitude_deg)) +
+                    static_cast<int>(!std::isnan(config.datum_height_m));
+  if (given == 0) {
+    return std::nullopt;
+  }
+  if (given != 3) {
+    throw ConfigError(
+        "gps_odometry: datum_latitude_deg, datum_longitude_deg and datum_height_m belong "
+        "together; " +
+        std::to_string(given) + " of 3 are given.");
+  }
+  const Datum datum{
+      config.datum_latitude_deg, config.datum_longitude_deg, config.datum_height_m, 0};
+  if (const auto fault =
+          geodesy::find_fault({datum.latitude_deg, datum.longitude_deg, datum.height_m})) {
+    throw ConfigError("gps_odometry: the datum is not a place: " + *fault + ".");
+  }
+  return datum;
+}
+
+geodesy::Geographic place_of(const Datum& datum) {
+  return {datum.latitude_deg, datum.longitude_deg, datum.height_m};
+}
+
+}  // namespace
+
+struct GpsOdometry::Impl {
+  Impl(const Config& c, const RobotConfig& robot)
+      : config(c),
+        datum(configured_datum(c)),
+        imu_checks(c, robot.q_base_imu()),
+        tracker(c, robot.antenna_position_base_m),
+        buffer(tracker, from_seconds(c.rewind_s)),
+        election(c) {
+    if (datum) {
+      frame.emplace(*datum);
+    }
+  }
+
+  void take_imu(const ImuSample& sample, Output& output);
+  void take_fix(const GnssFix& message, Output& output);
+  std::optional<CheckedFix> checked(const GnssFix& message, Output& output);
+  bool is_untimely(const CheckedFix& fix, Output& output);
+  void refuse(const std::string& reason,
+              const std::string& text,
+              Nanoseconds stamp_ns,
+              Output& output);
+  MapFix place(const CheckedFix& fix) const;
+  void elect(const CheckedFix& fix, Output& output);
+  void move_to(const Datum& new_datum);
+  void publish_odometry(Output& output);
+  Odometry odometry() const;
+  GpsStatus status() const;
+  void see(Nanoseconds stamp_ns);
+  Surroundings around() const;
+
+  Config config;
+  std::optional<Datum> datum;
+  /// The datum's, or until there is one that of the first fix: heading is searched meanwhile.
+  std::optional<geodesy::LocalFrame> frame;
+  ImuChecks imu_checks;
+  Tracker tracker;
+  RewindBuffer buffer;
+  DatumElection election;
+  FrozenReceiver frozen;
+  Counters counters;
+  std::uint64_t fixes_received{0};
+  std::uint64_t imu_received{0};
+  Nanoseconds now_ns{0};
+  int fixes_ahead{0};
+  Nanoseconds newest_ahead_ns{0};
+  std::optional<Nanoseconds> published_ns;
+  std::optional<Nanoseconds> status_ns;
+};
+
+void GpsOdometry::Impl::see(Nanoseconds stamp_ns) {
+  election.begin(stamp_ns);
+  now_ns = std::max(now_ns, stamp_ns);
+}
+
+void GpsOdometry::Impl::refuse(const std::string& reason,
+                               const std::string& text,
+                               Nanoseconds stamp_ns,
+                               Output& output) {
+  counters.add(reason);
+  const bool repaired = reason.starts_with("used_");
+  output.events.push_back({repaired ? Severity::kInfo : Severity::kWarning,
+                           stamp_ns,
+                           (repaired ? "fix_" : "refused_") + reason,
+                           text});
+}
+
+// ---- IMU ----------------------------------------------------------------------------------------
+
+void GpsOdometry::Impl::take_imu(const ImuSample& sample, Output& output) {
+  ++imu_received;
+  const ImuVerdict verdict = imu_checks.check(sample);
+  if (!verdict.reason.empty()) {
+    counters.add(verdict.reason);
+    output.events.push_back({Severity::kError, sample.stamp_ns, verdict.reason, verdict.text});
+  }
+  if (verdict.clock_reset) {
+    buffer.restart();
+    now_ns = sample.stamp_ns;
+    published_ns.reset();
+    status_ns.reset();
+  }
+  if (verdict.sample) {
+    see(sample.stamp_ns);
+    fixes_ahead = 0;
+    buffer.insert(*verdict.sample);
+    publish_odometry(output);
+  }
+  if (!status_ns || now_ns - *status_ns >= kStatusInterval_ns) {
+    output.status = status();
+    status_ns = now_ns;
+  }
+}
+
+// ---- fixes --------------------------------------------------------------------------------------
+
+std::optional<CheckedFix> GpsOdometry::Impl::checked(const GnssFix& message, Output& output) {
+  const FixVerdict verdict = check_fix(message, config);
+  if (!verdict.reason.empty()) {
+    refuse(verdict.reason, verdict.text, message.stamp_ns, output);
+  }
+  if (!verdict.fix || is_untimely(*verdict.fix, output)) {
+    return std::nullopt;
+  }
+  const bool moving = buffer.newest().phase == Phase::kRunning &&
+                      buffer.newest().filter.x.segment<3>(kVelocity).norm() > kFrozenSpeed_mps;
+  if (const auto repeats = frozen.count(verdict.fix->place);
+      moving && repeats > config.frozen_fixes) {
+    refuse("frozen",
+           "Fix refused: the same position came " + std::to_string(repeats) +
+               " times in a row while the vehicle moves, expected at most " +
+               std::to_string(config.frozen_fixes) + ".",
+           message.stamp_ns,
+           output);
+    return std::nullopt;
+  }
+  return verdict.fix;
+}
+
+bool GpsOdometry::Impl::is_untimely(const CheckedFix& fix, Output& output) {
+  const auto imu_ns = buffer.newest_imu_ns();
+  if (buffer.has_fix_at(fix.stamp_ns)) {
+    refuse("duplicate_stamp",
+           "Fix refused: there was one with its stamp " + std::to_string(to_seconds(fix.stamp_ns)) +
+               " s already.",
+           fix.stamp_ns,
+           output);
+    return true;
+  }
+  if (buffer.is_too_old(fix.stamp_ns)) {
+    refuse("too_old",
+           "Fix refused: it is " + std::to_string(to_seconds(now_ns - fix.stamp_ns)) +
+               " s old, expected at most " + std::to_string(config.rewind_s) + " s.",
+           fix.stamp_ns,
+           output);
+    return true;
+  }
+  if (imu_ns && fix.stamp_ns > *imu_ns + from_seconds(config.future_limit_s)) {
+    fixes_ahead = fix.stamp_ns > newest_ahead_ns ? fixes_ahead + 1 : 1;
+    newest_ahead_ns = fix.stamp_ns;
+    refuse("future_stamp",
+           "Fix refused: its stamp is " + std::to_string(to_seconds(fix.stamp_ns - *imu_ns)) +
+               " s ahead of the newest IMU sample, expected at most " +
+               std::to_string(config.future_limit_s) + " s.",
+           fix.stamp_ns,
+           output);
+    return true;
+  }
+  return false;
+}
+
+MapFix GpsOdometry::Impl::place(const CheckedFix& fix) const {
+  const Eigen::Matrix3d R = frame->R_map_enu(fix.place);
+  return {fix,
+          frame->to_map(fix.place).value_or(Eigen::Vector3d::Zero()),
+          R * fix.covariance_enu_m2 * R.transpose()};
+}
+
+void GpsOdometry::Impl::take_fix(const GnssFix& message, Output& output) {
+  ++fixes_received;
+  if (const auto fix = checked(message, output)) {
+    if (!buffer.newest_imu_ns()) {
+      see(fix->stamp_ns);
+    }
+    if (!frame) {
+      frame.emplace(
+          Datum{fix->place.latitude_deg, fix->place.longitude_deg, fix->place.height_m, 0});
+    }
+    const FixOutcome outcome = buffer.insert(place(*fix));
+    if (!outcome.reason.empty()) {
+      // Counted in the Track, because a later rewind may decide otherwise.
+      output.events.push_back({outcome.accepted ? Severity::kInfo : Severity::kWarning,
+                               fix->stamp_ns,
+                               "fix_" + outcome.reason,
+                               outcome.text});
+    }
+    elect(*fix, output);
+  }
+  output.status = status();
+  status_ns = now_ns;
+}
+
+// ---- datum --------------------------------------------------------------------------------------
+
+void GpsOdometry::Impl::elect(const CheckedFix& fix, Output& output) {
+  if (datum) {
+    return;
+  }
+  if (const auto elected = election.add(fix)) {
+    move_to(*elected);
+    output.elected = elected;
+    output.events.push_back({Severity::kInfo,
+                             fix.stamp_ns,
+                             "datum_elected",
+                             "Nobody named a datum: elected " + elected->id() + " from " +
+                                 std::to_string(config.datum_fixes) + " fixes."});
+  }
+}
+
+void GpsOdometry::Impl::move_to(const Datum& new_datum) {
+  geodesy::LocalFrame new_frame(new_datum);
+  if (frame) {
+    const geodesy::Geographic old_origin = place_of(frame->datum());
+    const Eigen::Matrix3d R = new_frame.R_map_enu(old_origin);
+    const Eigen::Vector3d t = new_frame.to_map(old_origin).value_or(Eigen::Vector3d::Zero());
+    buffer.change_frame(R, t);
+    if (datum) {
+      buffer.announce_reset({std::atan2(R(1, 0), R(0, 0)), t});
+    }
+  }
+  frame = std::move(new_frame);
+  datum = new_datum;
+}
+
+// ---- output -------------------------------------------------------------------------------------
+
+Odometry GpsOdometry::Impl::odometry() const {
+  const Track& track = buffer.newest();
+  Odometry odometry;
+  odometry.stamp_ns = track.stamp_ns;
+  odometry.frame_id = "map";
+  odometry.child_frame_id = "base_link";
+  odometry.T_frame_child = tracker.pose(track);
+  odometry.pose_covariance = tracker.pose_covariance(track);
+  odometry.angular_radps = track.filter.x.segment<3>(kRate);
+  odometry.twist_covariance = tracker.twist_covariance(track);
+  if (track.phase == Phase::kRunning) {
+    odometry.linear_mps = track.filter.x.segment<3>(kVelocity);
+  } else {
+    odometry.twist_covariance.topLeftCorner<3, 3>() =
+        Eigen::Matrix3d::Identity() * kUnknownVariance;
+    odometry.twist_covariance.topRightCorner<3, 3>().setZero();
+    odometry.twist_covariance.bottomLeftCorner<3, 3>().setZero();
+  }
+  return odometry;
+}
+
+void GpsOdometry::Impl::publish_odometry(Output& output) {
+  const Track& track = buffer.newest();
+  if (!datum || track.phase == Phase::kNoImu || track.accepted_ns == 0) {
+    return;
+  }
+  // A tenth of a period of tolerance: stamps of a 100 Hz IMU jitter.
+  const Nanoseconds period_ns = from_seconds(0.9 / config.publish_rate_hz);
+  if (published_ns && track.stamp_ns - *published_ns < period_ns) {
+    return;
+  }
+  Odometry candidate = odometry();
+  if (!candidate.T_frame_child.is_finite() || !candidate.pose_covariance.allFinite()) {
+    counters.add("output_not_finite");
+    return;
+  }
+  published_ns = track.stamp_ns;
+  output.odometry = std::move(candidate);
+}
+
+Surroundings GpsOdometry::Impl::around() const {
+  return {now_ns, datum.has_value(), imu_checks.is_faulty(), fixes_ahead >= kSilentImuFixes};
+}
+
+GpsStatus GpsOdometry::Impl::status() const {
+  const Track& track = buffer.newest();
+  GpsStatus status;
+  status.stamp_ns = now_ns;
+  status.source = kSource;
+  status.health = health_of(track, tracker.yaw_sigma_rad(track), around(), config);
+  status.datum_id = datum ? datum->id() : "";
+  status.gnss_class = track.gnss_class;
+  if (datum) {
+    status.last_accepted_fix_ns = track.accepted_ns;
+    status.accepted_antenna_map_m = track.accepted_antenna_map_m;
+    status.accepted_covariance_map_m2 = track.accepted_covariance_map_m2;
+  }
+  status.test_ratio = track.test_ratio;
+  status.fixes_received = fixes_received;
+  status.fixes_accepted = track.accepted;
+  status.rejections = rejections_of(track, counters);
+  status.imu_received = imu_received;
+  status.reset = track.reset;
+  return status;
+}
+
+// ---- the face -----------------------------------------------------------------------------------
+
+GpsOdometry::GpsOdometry(const Config& config, const RobotConfig& robot)
+    : impl_(std::make_unique<Impl>(config, robot)) {}
+
+GpsOdometry::~GpsOdometry() = default;
+
+Output GpsOdometry::on_imu(const ImuSample& sample) {
+  Output output;
+  impl_->take_imu(sample, output);
+  return output;
+}
+
+Output GpsOdometry::on_fix(const GnssFix& fix) {
+  Output output;
+  impl_->take_fix(fix, output);
+  return output;
+}
+
+Output GpsOdometry::on_datum(const Datum& candidate) {
+  Output output;
+  Impl& impl = *impl_;
+  if (const auto fault = geodesy::find_fault(place_of(candidate))) {
+    impl.refuse("datum_not_a_place", "Datum refused: " + *fault + ".", impl.now_ns, output);
+    return output;
+  }
+  if (!impl.datum) {
+    impl.move_to(candidate);
+    output.events.push_back({Severity::kInfo,
+                             impl.now_ns,
+                             "datum_adopted",
+                             "Adopted the datum " + candidate.id() + "."});
+  } else if (candidate.id() != impl.datum->id()) {
+    const bool adopts = wins(candidate, *impl.datum);
+    const std::string kept = adopts ? candidate.id() : impl.datum->id();
+    const std::string dropped = adopts ? impl.datum->id() : candidate.id();
+    output.events.push_back(
+        {Severity::kError,
+         impl.now_ns,
+         "datum_conflict",
+         "Two data were elected: the older, " + kept + ", holds; " + dropped + " is dropped."});
+    if (adopts) {
+      impl.move_to(candidate);
+    }
+  }
+  return output;
+}
+
+std::optional<Datum> GpsOdometry::datum() const {
+  return impl_->datum;
+}
+
+}  // namespace trigpoint::gps_odometry
