@@ -4,7 +4,7 @@
 
 #include "trigpoint/bus/backend.hpp"
 
-#include "worker.hpp"
+#include "../worker.hpp"
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>

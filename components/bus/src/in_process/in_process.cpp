@@ -82,6 +82,19 @@ bool LocalWriter::wait_for_acknowledgments(std::chrono::nanoseconds timeout) {
   return outstanding_->wait_for_none(timeout);
 }
 
+void LocalWriter::readers_changed(int change) {
+  readers_ += change;
+  if (events_.readers_changed) {
+    notices_.post(this, [this, readers = readers_.load()] { events_.readers_changed(readers); });
+  }
+}
+
+void LocalWriter::refused(const std::string& policy) {
+  if (events_.incompatible_qos) {
+    notices_.post(this, [this, policy] { events_.incompatible_qos(policy); });
+  }
+}
+
 LocalReader::LocalReader(int domain,
                          const backend::TypeOps& type,
                          Endpoint endpoint,
@@ -223,9 +236,7 @@ void Hub::meet(LocalWriter& writer, LocalReader& reader) {
   const std::string policy = incompatible_policy(writer, reader);
   if (!policy.empty()) {
     reader.refused(policy);
-    if (writer.events_.incompatible_qos) {
-      writer.events_.incompatible_qos(policy);
-    }
+    writer.refused(policy);
   }
   if (policy == "RELIABILITY") {
     reader.endpoint_.qos.reliability = Reliability::kBestEffort;
@@ -233,10 +244,7 @@ void Hub::meet(LocalWriter& writer, LocalReader& reader) {
     return;
   }
   reader.matched_with(writer.guid_);
-  ++writer.readers_;
-  if (writer.events_.readers_changed) {
-    writer.events_.readers_changed(writer.readers_);
-  }
+  writer.readers_changed(1);
   if (reader.endpoint_.qos.durability == Durability::kTransientLocal) {
     for (const LocalWriter::Sample& sample : writer.history_) {
       send(writer, reader, sample);
@@ -249,10 +257,7 @@ void Hub::part(LocalWriter& writer, LocalReader& reader) {
     return;
   }
   reader.lost(writer.guid_);
-  --writer.readers_;
-  if (writer.events_.readers_changed) {
-    writer.events_.readers_changed(writer.readers_);
-  }
+  writer.readers_changed(-1);
 }
 
 void Hub::add(LocalWriter& writer) {

@@ -6,6 +6,8 @@
 
 #include "trigpoint/bus/backend.hpp"
 
+#include "../worker.hpp"
+
 #include <atomic>
 #include <condition_variable>
 #include <cstdint>
@@ -76,6 +78,9 @@ class LocalWriter : public backend::Writer {
     Nanoseconds stamp_ns;
   };
 
+  void readers_changed(int change);
+  void refused(const std::string& policy);
+
   const int domain_;
   const backend::TypeOps type_;
   const Endpoint endpoint_;
@@ -84,6 +89,7 @@ class LocalWriter : public backend::Writer {
   const std::shared_ptr<Outstanding> outstanding_;
   std::atomic<int> readers_{0};
   std::deque<Sample> history_;  ///< for late joiners; guarded by the hub
+  Worker notices_;              ///< told outside the hub's lock; ends before what it uses
 };
 
 class LocalReader : public backend::Reader {

@@ -4,7 +4,7 @@
 
 #include <utility>
 
-namespace trigpoint::bus::fastdds {
+namespace trigpoint::bus {
 
 Worker::Worker() : thread_([this] { work(); }) {}
 
@@ -49,4 +49,4 @@ void Worker::work() {
   }
 }
 
-}  // namespace trigpoint::bus::fastdds
+}  // namespace trigpoint::bus

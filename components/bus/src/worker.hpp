@@ -8,7 +8,7 @@
 #include <mutex>
 #include <thread>
 
-namespace trigpoint::bus::fastdds {
+namespace trigpoint::bus {
 
 /// One thread for what must not be done inside a listener, such as deleting its reader.
 class Worker {
@@ -36,4 +36,4 @@ class Worker {
   std::thread thread_;
 };
 
-}  // namespace trigpoint::bus::fastdds
+}  // namespace trigpoint::bus

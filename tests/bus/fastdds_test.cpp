@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// What only a network can show: small socket buffers, killed processes.
+#include "trigpoint/bus/convert.hpp"
+#include "trigpoint/bus/topics.hpp"
+
+#include "../unit/bus/samples.hpp"
+#include "bus_fixture.hpp"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <csignal>
+#include <thread>
+
+namespace trigpoint::bus {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::Collected;
+using testing::kForever;
+using testing::own_domain;
+using testing::Readers;
+
+constexpr std::int64_t kStockKernelBuffer_bytes = 212'992;
+
+Config small_buffers() {
+  Config config = own_domain();
+  config.socket_buffer_bytes = kStockKernelBuffer_bytes;
+  return config;
+}
+
+PointCloudMessage two_megabytes(std::uint32_t number) {
+  PointCloudMessage cloud = samples::cloud();
+  cloud.height = number;
+  cloud.data.assign(2'000'000, static_cast<std::uint8_t>(number));
+  return cloud;
+}
+
+TEST(SmallBuffers, are_told_with_their_size_and_the_remedy) {
+  Collected<Event> events;
+  Participant participant(small_buffers(), "small", [&](const Event& event) { events.add(event); });
+  ASSERT_EQ(events.size(), 1U);
+  EXPECT_EQ(events.items()[0].code, "bus_small_socket_buffers");
+  EXPECT_THAT(events.items()[0].text, ::testing::HasSubstr("212992"));
+  EXPECT_THAT(events.items()[0].text, ::testing::HasSubstr("net.core.rmem_max"));
+}
+
+TEST(SmallBuffers, still_carry_every_two_megabyte_cloud_and_imu_sample) {
+  constexpr std::uint32_t kClouds = 40;
+  constexpr auto kCloudPeriod = 100ms;
+  constexpr auto kImuPeriod = 5ms;
+  Participant sensors(small_buffers(), "sensors");
+  Participant mapper(small_buffers(), "mapper");
+  Collected<std::uint32_t> clouds;
+  std::atomic<std::uint32_t> damaged{0};
+  std::atomic<int> imu_heard{0};
+  Subscription<sensor_msgs::msg::PointCloud2> cloud_reader(
+      mapper, topics::points, [&](const auto& cloud, const MessageInfo&) {
+        damaged += cloud.data() != two_megabytes(cloud.height()).data() ? 1U : 0U;
+        clouds.add(cloud.height());
+      });
+  Subscription<sensor_msgs::msg::Imu> imu_reader(
+      mapper, topics::imu, [&](const auto&, const MessageInfo&) { ++imu_heard; });
+  Readers cloud_readers;
+  Readers imu_readers;
+  Publisher cloud_writer(sensors, topics::points, cloud_readers.events());
+  Publisher imu_writer(sensors, topics::imu, imu_readers.events());
+  ASSERT_TRUE(cloud_readers.wait_for(1) && imu_readers.wait_for(1));
+
+  std::atomic<bool> ended{false};
+  int imu_sent = 0;
+  std::thread imu([&] {
+    for (auto due = std::chrono::steady_clock::now(); !ended; due += kImuPeriod) {
+      std::this_thread::sleep_until(due);
+      imu_sent += imu_writer.publish(to_message(samples::imu())) ? 1 : 0;
+    }
+  });
+  auto due = std::chrono::steady_clock::now();
+  for (std::uint32_t number = 0; number < kClouds; ++number) {
+    std::this_thread::sleep_until(due += kCloudPeriod);
+    EXPECT_TRUE(cloud_writer.publish(to_message(two_megabytes(number))));
+  }
+  EXPECT_TRUE(cloud_writer.wait_for_acknowledgments(kForever));
+  ended = true;
+  imu.join();
+  EXPECT_TRUE(imu_writer.wait_for_acknowledgments(kForever));
+  EXPECT_TRUE(clouds.wait_for(kClouds)) << clouds.size() << " of " << kClouds << " clouds arrived";
+  EXPECT_EQ(damaged, 0U);
+  EXPECT_EQ(imu_heard, imu_sent);
+}
+
+/// A process that publishes on gps/fix until it is killed.
+pid_t start_publisher(const Config& config) {
+  const pid_t child = fork();
+  if (child == 0) {
+    Participant participant(config, "child");
+    Publisher publisher(participant, topics::fix);
+    while (true) {
+      publisher.publish(to_message(samples::fix()));
+      std::this_thread::sleep_for(20ms);
+    }
+  }
+  return child;
+}
+
+TEST(KilledProcess, is_noticed_within_its_lease) {
+  constexpr auto kNoticeLimit = 3s;  // lease of 2 s and a busy machine
+  const Config config = own_domain();
+  const pid_t child = start_publisher(config);  // before this process has threads
+  Participant participant(config, "parent");
+  Collected<std::string> lost;
+  Collected<std::string> writers;
+  Subscription<sensor_msgs::msg::NavSatFix> subscription(
+      participant,
+      topics::fix,
+      [](const auto&, const MessageInfo&) {},
+      {[&](const std::string& guid) { writers.add(guid); },
+       [&](const std::string& guid) { lost.add(guid); },
+       {}});
+  ASSERT_TRUE(writers.wait_for(1));
+  kill(child, SIGKILL);
+  waitpid(child, nullptr, 0);
+  const auto killed = std::chrono::steady_clock::now();
+  ASSERT_TRUE(lost.wait_for(1));
+  EXPECT_LE(std::chrono::steady_clock::now() - killed, kNoticeLimit);
+  EXPECT_EQ(lost.items(), writers.items());
+}
+
+TEST(NetworkInterface, that_does_not_exist_is_refused_with_those_that_do) {
+  Config config = own_domain();
+  config.network_interface = "wlan77";
+  try {
+    Participant participant(config, "wrong");
+    FAIL() << "accepted";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("wlan77"));
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("lo (127.0.0.1)"));
+  }
+}
+
+TEST(InitialPeers, that_are_no_addresses_are_refused) {
+  for (const char* peer : {"robot", "10.0.0.300", "10.0.0.2:0", "10.0.0.2:70000"}) {
+    Config config = own_domain();
+    config.initial_peers = {peer};
+    EXPECT_THROW(Participant(config, "wrong"), std::runtime_error) << peer;
+  }
+}
+
+}  // namespace
+}  // namespace trigpoint::bus
