@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "trigpoint/evaluation/continuity.hpp"
+
+#include "trigpoint/base/so3.hpp"
+
+#include <algorithm>
+#include <numbers>
+
+namespace trigpoint::evaluation {
+
+namespace {
+
+constexpr double kDegrees = 180.0 / std::numbers::pi;
+
+void keep_larger(Step& largest, const Pose& expected, const StampedPose& actual) {
+  ++largest.intervals;
+  const double distance_m = (actual.pose.p - expected.p).norm();
+  if (distance_m > largest.distance_m) {
+    largest.distance_m = distance_m;
+    largest.rotation_deg = so3_log(expected.q.conjugate() * actual.pose.q).norm() * kDegrees;
+    largest.stamp_ns = actual.stamp_ns;
+  }
+}
+
+}  // namespace
+
+Step largest_step(const Trajectory& fused, const Trajectory& lio) {
+  Step largest;
+  largest.relative_to_lio = true;
+  std::optional<Pose> T_map_odom;
+  for (const auto& pose : fused) {
+    const auto odom = pose_at(lio, pose.stamp_ns);
+    if (odom && T_map_odom) {
+      keep_larger(largest, *T_map_odom * *odom, pose);
+    }
+    T_map_odom = odom ? std::optional<Pose>(pose.pose * odom->inverse()) : std::nullopt;
+  }
+  return largest;
+}
+
+Step largest_step(const Trajectory& trajectory) {
+  Step largest;
+  for (std::size_t i = 1; i < trajectory.size(); ++i) {
+    keep_larger(largest, trajectory[i - 1].pose, trajectory[i]);
+  }
+  return largest;
+}
+
+std::vector<Window> find_outages(const std::vector<Nanoseconds>& fixes_ns,
+                                 Nanoseconds end_ns,
+                                 Nanoseconds shortest_ns) {
+  std::vector<Window> windows;
+  for (std::size_t i = 0; i < fixes_ns.size(); ++i) {
+    const Nanoseconds next_ns = i + 1 < fixes_ns.size() ? fixes_ns[i + 1] : end_ns;
+    if (next_ns - fixes_ns[i] > shortest_ns) {
+      windows.push_back({fixes_ns[i], next_ns});
+    }
+  }
+  return windows;
+}
+
+bool is_inside(const std::vector<Window>& windows, Nanoseconds stamp_ns) {
+  return std::any_of(windows.begin(), windows.end(), [&](const Window& window) {
+    return window.begin_ns < stamp_ns && stamp_ns < window.end_ns;
+  });
+}
+
+std::vector<OutageError> outage_errors(const std::vector<PosePair>& pairs,
+                                       const std::vector<Window>& windows) {
+  std::vector<OutageError> errors;
+  for (const auto& window : windows) {
+    auto& result = errors.emplace_back();
+    result.window = window;
+    for (const auto& pair : pairs) {
+      if (!is_inside({window}, pair.stamp_ns)) {
+        continue;
+      }
+      const double error_m = (pair.estimate.p - pair.reference.p).norm();
+      result.begin_m = result.pairs == 0 ? error_m : result.begin_m;
+      result.max_m = result.pairs == 0 ? error_m : std::max(result.max_m, error_m);
+      result.end_m = error_m;
+      ++result.pairs;
+    }
+  }
+  return errors;
+}
+
+}  // namespace trigpoint::evaluation
