@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "finish_session.hpp"
+
+#include "trigpoint/export/map.hpp"
+#include "trigpoint/export/session.hpp"
+
+#include "progress.hpp"
+
+#include <filesystem>
+#include <iostream>
+#include <optional>
+
+namespace trigpoint::cli {
+
+namespace {
+
+namespace fs = std::filesystem;
+namespace file = exporter::session_file;
+using exporter::path_in;
+
+constexpr double kMapVoxel_m = 0.1;
+
+std::optional<Alignment> alignment_of(const std::string& session) {
+  const std::string path = path_in(session, file::kAlignment);
+  if (!fs::exists(path)) {
+    return std::nullopt;
+  }
+  return exporter::read_alignment(path).alignment;
+}
+
+void render_map(const std::string& session) {
+  const std::string keyframes = path_in(session, file::kKeyframes);
+  if (!fs::exists(keyframes)) {
+    std::cerr << "no keyframes in " << session << ": no map\n";
+    return;
+  }
+  Progress progress("rendering the map");
+  const exporter::MapReport map = exporter::render_map(keyframes,
+                                                       alignment_of(session),
+                                                       kMapVoxel_m,
+                                                       path_in(session, file::kMap),
+                                                       [&](double share) { progress(share); });
+  if (!map.remark.empty()) {
+    std::cerr << "map: " << map.remark << "\n";
+  }
+}
+
+}  // namespace
+
+int finish_session(const std::string& session) {
+  render_map(session);
+  return 0;
+}
+
+std::string mode_of(const SystemConfig& config) {
+  return config.cores.fusion_gate.mode;
+}
+
+}  // namespace trigpoint::cli
