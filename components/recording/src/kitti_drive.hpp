@@ -16,23 +16,18 @@
 
 namespace trigpoint::recording {
 
-/// Stamps of the OXTS minus stamps of the Velodyne at the same moment. In drive 2011_09_26_0009
-/// the OXTS record that KITTI's authors paired with a sweep carries a stamp 12 to 22 ms after that
-/// sweep's middle (mean 17 ms over 447 pairs); README.md tells how this was checked.
-inline constexpr Nanoseconds kOxtsMinusVelodyneClock_ns = 17'000'000;
+/// Stamps of the OXTS minus stamps of the Velodyne at the same moment. The OXTS record that KITTI
+/// paired with a sweep is stamped 12 to 22 ms (mean 17) after that sweep's middle, but this is the
+/// delay of the camera image to which both were paired, not one of the clocks: with the sweeps of
+/// drive 2011_09_26_0009 undistorted and accumulated along the INS's poses, the ground is thinnest
+/// at 0 ms (+-7) and facades at -10 ms (+-15). README.md tells how this was measured.
+inline constexpr Nanoseconds kOxtsMinusVelodyneClock_ns = 0;
 
 /// A sweep on disk; stamps on the Velodyne's clock.
 struct KittiSweep {
   std::filesystem::path file;
   Nanoseconds start_ns{0};
   Nanoseconds end_ns{0};
-};
-
-/// One OXTS record (10 Hz) or row of imu100.csv: the INS's attitude, for reference only.
-struct KittiInsPose {
-  Nanoseconds stamp_ns{0};
-  Eigen::Quaterniond q_enu_base{Eigen::Quaterniond::Identity()};
-  Eigen::Vector3d p_enu_m{Eigen::Vector3d::Zero()};
 };
 
 struct KittiDrive {

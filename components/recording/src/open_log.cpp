@@ -2,9 +2,11 @@
 // Copyright the Trigpoint developers
 #include "trigpoint/recording/log.hpp"
 
+#include "bag_source.hpp"
 #include "kitti_drive.hpp"
 #include "kitti_reader.hpp"
 #include "log_window.hpp"
+#include "rosbag1_source.hpp"
 
 #include <filesystem>
 
@@ -15,8 +17,11 @@ namespace fs = std::filesystem;
 namespace {
 
 std::unique_ptr<LogReader> open_by_kind(const fs::path& path,
-                                        const RobotConfig& /*robot*/,
+                                        const RobotConfig& robot,
                                         const LogOptions& options) {
+  if (fs::is_regular_file(path) && path.filename().string().find(".bag") != std::string::npos) {
+    return read_bag(open_rosbag1(path), robot, options);
+  }
   if (const auto sync_folder = find_kitti_sync_folder(path)) {
     return open_kitti_drive(*sync_folder, options);
   }
