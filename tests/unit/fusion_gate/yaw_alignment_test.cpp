@@ -143,6 +143,9 @@ Spread measure_spread(const Drive& drive) {
   }
   spread.yaw_rms_rad = std::sqrt(spread.yaw_rms_rad);
   spread.yaw_sigma_rad = std::sqrt(spread.yaw_sigma_rad);
+  testing::Test::RecordProperty("yaw_rms_over_sigma",
+                                std::to_string(spread.yaw_rms_rad / spread.yaw_sigma_rad));
+  testing::Test::RecordProperty("nees", std::to_string(spread.nees));
   return spread;
 }
 

@@ -22,19 +22,21 @@ namespace {
 
 using Weights = Eigen::VectorXd;  // one a pair, 1 = fully trusted
 
-// [2]: beyond this many sigmas a residual loses its influence. 3 rather than the 95 % value 2.385,
-// because the sigmas here already are on the cautious side.
+// Full trust below (a residual's squared sigmas: 5 % of the good horizontal ones lie above), a
+// Cauchy weight [2] of this scale beyond.
+constexpr double kTrustedSquaredSigmas = 6.0;
 constexpr double kCauchyScale = 3.0;
-constexpr double kOutlierWeight = 0.3;  // a residual above 4.6 sigma
+constexpr double kOutlierWeight = 0.3;  // a residual above 5.2 sigma
 constexpr double kMaxOutlierShare = 0.35;
 constexpr int kClosedFormIterations = 15;
 constexpr int kMaxIterations = 15;
-constexpr double kConverged = 1e-10;  // rad and m
+constexpr double kConverged = 1e-8;  // rad and m
 // Yaw lies within half a turn: the only prior, so that one pair alone leaves a regular system.
 constexpr double kYawPriorInformation = 1.0 / (std::numbers::pi * std::numbers::pi);
 
-double cauchy_weight(double squared_sigmas) {
-  return 1.0 / (1.0 + squared_sigmas / (kCauchyScale * kCauchyScale));
+double robust_weight(double squared_sigmas) {
+  const double excess = std::max(0.0, squared_sigmas - kTrustedSquaredSigmas);
+  return 1.0 / (1.0 + excess / (kCauchyScale * kCauchyScale));
 }
 
 double median(std::vector<double> values) {
@@ -88,7 +90,7 @@ YawPose robust_closed_form(const std::vector<AlignmentPair>& pairs) {
     }
     const double scale = std::max(1.0, median(squared_sigmas));
     for (Eigen::Index k = 0; k < weights.size(); ++k) {
-      weights[k] = base[k] * cauchy_weight(squared_sigmas[static_cast<std::size_t>(k)] / scale);
+      weights[k] = base[k] * robust_weight(squared_sigmas[static_cast<std::size_t>(k)] / scale);
     }
     estimate = closed_form(pairs, weights);
   }
@@ -99,34 +101,33 @@ double drift_variance(const AlignmentPair& pair, double now_m, const AlignmentCo
   return config.lio_drift_m_per_sqrt_m * config.lio_drift_m_per_sqrt_m * (now_m - pair.distance_m);
 }
 
-double total_variance(const AlignmentPair& pair, int axis, double now_m, const AlignmentConfig& c) {
-  return (c.correlated_share + c.white_share) * pair.variance_map_m2[axis] +
-         drift_variance(pair, now_m, c);
-}
+using Covariances = std::array<Eigen::MatrixXd, 3>;  // of the residuals, one an axis of map
 
-/// Of one axis' residuals: Gauss-Markov GPS error, LIO's random walk counted back from the newest
-/// pair (so that the solution is T_map_odom as of now), and white error grown where distrusted.
-Eigen::MatrixXd residual_covariance(const std::vector<AlignmentPair>& pairs,
-                                    int axis,
-                                    const Weights& weights,
-                                    const AlignmentConfig& config) {
+/// Gauss-Markov GPS error, LIO's random walk counted back from the newest pair (so that the
+/// solution is T_map_odom as of now), and white error.
+Covariances residual_covariances(const std::vector<AlignmentPair>& pairs,
+                                 const AlignmentConfig& config) {
   const auto n = static_cast<Eigen::Index>(pairs.size());
   const double now_m = pairs.back().distance_m;
-  Eigen::MatrixXd covariance(n, n);
+  Covariances covariances;
+  covariances.fill(Eigen::MatrixXd(n, n));
   for (Eigen::Index i = 0; i < n; ++i) {
     const AlignmentPair& a = pairs[static_cast<std::size_t>(i)];
     for (Eigen::Index j = 0; j <= i; ++j) {
       const AlignmentPair& b = pairs[static_cast<std::size_t>(j)];
       const double age_s = std::abs(to_seconds(a.stamp_ns - b.stamp_ns));
-      const double sigmas_m2 = std::sqrt(a.variance_map_m2[axis] * b.variance_map_m2[axis]);
-      covariance(i, j) =
-          config.correlated_share * sigmas_m2 * std::exp(-age_s / config.correlation_time_s) +
+      const double share = config.correlated_share * std::exp(-age_s / config.correlation_time_s) +
+                           (i == j ? config.white_share : 0.0);
+      const double drift_m2 =
           std::min(drift_variance(a, now_m, config), drift_variance(b, now_m, config));
-      covariance(j, i) = covariance(i, j);
+      for (int axis = 0; axis < 3; ++axis) {
+        const double value = share * std::sqrt(a.variance_map_m2[axis] * b.variance_map_m2[axis]);
+        covariances[static_cast<std::size_t>(axis)](i, j) = value + drift_m2;
+        covariances[static_cast<std::size_t>(axis)](j, i) = value + drift_m2;
+      }
     }
-    covariance(i, i) += config.white_share * a.variance_map_m2[axis] / weights[i];
   }
-  return covariance;
+  return covariances;
 }
 
 struct Linearised {
@@ -142,20 +143,17 @@ struct RobustWeights {
 
 RobustWeights weigh(const std::vector<AlignmentPair>& pairs,
                     const YawPose& estimate,
-                    const AlignmentConfig& config) {
+                    const Covariances& covariances) {
   const auto n = static_cast<Eigen::Index>(pairs.size());
   RobustWeights weights{Weights(n), Weights(n)};
   const Pose T_map_odom = estimate.pose();
-  const double now_m = pairs.back().distance_m;
   for (Eigen::Index k = 0; k < n; ++k) {
-    const AlignmentPair& pair = pairs[static_cast<std::size_t>(k)];
-    const Eigen::Vector3d r = residual_of(pair, T_map_odom);
-    Eigen::Vector3d squared_sigmas;
-    for (int axis = 0; axis < 3; ++axis) {
-      squared_sigmas[axis] = r[axis] * r[axis] / total_variance(pair, axis, now_m, config);
-    }
-    weights.horizontal[k] = cauchy_weight(squared_sigmas.head<2>().sum());
-    weights.vertical[k] = cauchy_weight(squared_sigmas.z());
+    const Eigen::Vector3d r = residual_of(pairs[static_cast<std::size_t>(k)], T_map_odom);
+    const Eigen::Vector3d variance_m2(
+        covariances[0](k, k), covariances[1](k, k), covariances[2](k, k));
+    const Eigen::Vector3d squared_sigmas = r.cwiseAbs2().cwiseQuotient(variance_m2);
+    weights.horizontal[k] = robust_weight(squared_sigmas.head<2>().sum());
+    weights.vertical[k] = robust_weight(squared_sigmas.z());
   }
   return weights;
 }
@@ -189,12 +187,17 @@ Linearised linearise(const std::vector<AlignmentPair>& pairs,
   return result;
 }
 
-std::array<Factor, 3> factorise(const std::vector<AlignmentPair>& pairs,
-                                const RobustWeights& weights,
-                                const AlignmentConfig& config) {
-  return {Factor(residual_covariance(pairs, 0, weights.horizontal, config)),
-          Factor(residual_covariance(pairs, 1, weights.horizontal, config)),
-          Factor(residual_covariance(pairs, 2, weights.vertical, config))};
+/// A distrusted pair gets as much more white error as it needs to weigh what its weight says.
+std::array<Factor, 3> factorise(const Covariances& covariances, const RobustWeights& weights) {
+  std::array<Factor, 3> factors;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const Weights& w = axis < 2 ? weights.horizontal : weights.vertical;
+    Eigen::MatrixXd covariance = covariances[axis];
+    const Eigen::ArrayXd total_m2 = covariances[axis].diagonal().array();
+    covariance.diagonal().array() += total_m2 * (1.0 / w.array() - 1.0);
+    factors[axis].compute(covariance);
+  }
+  return factors;
 }
 
 double horizontal_extent(const std::vector<AlignmentPair>& pairs) {
@@ -231,12 +234,13 @@ std::optional<AlignmentSolution> solve_alignment(const std::vector<AlignmentPair
   if (pairs.empty()) {
     return std::nullopt;
   }
+  const Covariances covariances = residual_covariances(pairs, config);
   YawPose estimate = robust_closed_form(pairs);
   Linearised system;
   RobustWeights weights;
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
-    weights = weigh(pairs, estimate, config);
-    system = linearise(pairs, estimate, factorise(pairs, weights, config));
+    weights = weigh(pairs, estimate, covariances);
+    system = linearise(pairs, estimate, factorise(covariances, weights));
     const Eigen::Vector4d step = system.information.ldlt().solve(system.gradient);
     estimate = {wrap_angle(estimate.yaw_rad + step[0]), estimate.p + step.tail<3>()};
     if (!step.allFinite() || step.norm() < kConverged) {
