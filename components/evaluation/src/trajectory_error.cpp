@@ -143,7 +143,8 @@ std::optional<Pose> align(const std::vector<PosePair>& pairs, AlignmentKind kind
                                                 : align_se3(estimate, reference);
 }
 
-std::vector<PosePair> apply(const Pose& T_reference_estimate, std::vector<PosePair> pairs) {
+std::vector<PosePair> place_estimates(const Pose& T_reference_estimate,
+                                      std::vector<PosePair> pairs) {
   for (auto& pair : pairs) {
     pair.estimate = T_reference_estimate * pair.estimate;
   }

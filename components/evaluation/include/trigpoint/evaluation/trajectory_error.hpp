@@ -67,7 +67,8 @@ std::string name_of(AlignmentKind kind);
 /// fewer than 2 (yaw) or 3 (SE(3)) pairs, or all in one place (yaw) or on one line (SE(3)).
 std::optional<Pose> align(const std::vector<PosePair>& pairs, AlignmentKind kind);
 
-std::vector<PosePair> apply(const Pose& T_reference_estimate, std::vector<PosePair> pairs);
+std::vector<PosePair> place_estimates(const Pose& T_reference_estimate,
+                                      std::vector<PosePair> pairs);
 
 /// As evo's: of magnitudes, median of an even number is the mean of the two in the middle.
 struct Statistics {
