@@ -7,6 +7,7 @@
 #include "kitti_reader.hpp"
 #include "log_window.hpp"
 #include "rosbag1_source.hpp"
+#include "rosbag2_source.hpp"
 
 #include <filesystem>
 
@@ -21,6 +22,9 @@ std::unique_ptr<LogReader> open_by_kind(const fs::path& path,
                                         const LogOptions& options) {
   if (fs::is_regular_file(path) && path.filename().string().find(".bag") != std::string::npos) {
     return read_bag(open_rosbag1(path), robot, options);
+  }
+  if (const auto files = find_rosbag2_files(path); !files.empty()) {
+    return read_bag(open_rosbag2(path, files), robot, options);
   }
   if (const auto sync_folder = find_kitti_sync_folder(path)) {
     return open_kitti_drive(*sync_folder, options);
