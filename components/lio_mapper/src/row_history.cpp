@@ -15,24 +15,26 @@ using Eigen::Vector3d;
 
 namespace {
 
-using Axes = std::vector<int>;
-using MatrixUpTo3 = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3>;
-using VectorUpTo3 = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1>;
-
-Axes admitted_axes(const StateUpdate& update) {
-  Axes axes;
-  for (int i = 0; i < 3; ++i) {
-    if (update.decision[static_cast<std::size_t>(i)] == AxisDecision::kFused) {
-      axes.push_back(i);
-    }
-  }
-  return axes;
+bool is_admitted(const StateUpdate& update, int axis) {
+  return update.decision[static_cast<std::size_t>(axis)] == AxisDecision::kFused;
 }
 
-/// Rows and columns of the admitted axes: what is left of a Gaussian when the others are not told.
-MatrixUpTo3 admitted_covariance(const StateUpdate& update) {
-  const Axes axes = admitted_axes(update);
-  return update.covariance_map_m2(axes, axes);
+bool admits_any(const StateUpdate& update) {
+  return is_admitted(update, 0) || is_admitted(update, 1) || is_admitted(update, 2);
+}
+
+/// The admitted axes' rows and columns, which is what is left of a Gaussian when the others are not
+/// told. The others get variance 1, which no row of H and no innovation meets.
+Matrix3d admitted_covariance(const StateUpdate& update) {
+  Matrix3d R = Matrix3d::Identity();
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      if (is_admitted(update, i) && is_admitted(update, j)) {
+        R(i, j) = update.covariance_map_m2(i, j);
+      }
+    }
+  }
+  return R;
 }
 
 bool is_usable(const StateUpdate& update) {
@@ -42,22 +44,27 @@ bool is_usable(const StateUpdate& update) {
   if (update.mode == UpdateMode::kOverwrite) {
     return true;
   }
-  const MatrixUpTo3 R = admitted_covariance(update);
+  const Matrix3d R = admitted_covariance(update);
   return R.allFinite() && R.isApprox(R.transpose(), 1e-6) && R.llt().info() == Eigen::Success &&
          R.diagonal().minCoeff() > 0.0;
 }
 
-/// The standard update with up to three rows, in place.
+/// The standard update with the admitted rows, in place.
 void condition_on(const StateUpdate& update,
                   const RowPrediction& prediction,
                   State& state,
                   ErrorMatrix& covariance) {
-  const Axes axes = admitted_axes(update);
-  const ErrorRows H = prediction.jacobian(axes, Eigen::all);
-  const VectorUpTo3 innovation = (update.position_map_m - prediction.position_map_m)(axes);
-  const MatrixUpTo3 S = H * covariance * H.transpose() + admitted_covariance(update);
-  const ErrorRows HP = H * covariance;
-  const ErrorRows gain_transposed = S.llt().solve(HP);
+  Eigen::Matrix<double, 3, error::kSize> H = prediction.jacobian;
+  Vector3d innovation = update.position_map_m - prediction.position_map_m;
+  for (int i = 0; i < 3; ++i) {
+    if (!is_admitted(update, i)) {
+      H.row(i).setZero();
+      innovation[i] = 0.0;
+    }
+  }
+  const Eigen::Matrix<double, 3, error::kSize> HP = H * covariance;
+  const Matrix3d S = HP * H.transpose() + admitted_covariance(update);
+  const Eigen::Matrix<double, 3, error::kSize> gain_transposed = S.llt().solve(HP);
   state = boxplus(state, gain_transposed.transpose() * innovation);
   covariance -= HP.transpose() * gain_transposed;
   make_symmetric(covariance);
@@ -157,7 +164,7 @@ void RowHistory::apply_rows_of(ScanRecord& record, const Pose& T_odom_base_wante
   record.state = record.before_rows;
   record.covariance = record.covariance_before_rows;
   for (const StateUpdate& row : record.rows) {
-    if (row.mode == UpdateMode::kRows && !admitted_axes(row).empty()) {
+    if (row.mode == UpdateMode::kRows && admits_any(row)) {
       condition_on(row,
                    predict_row(record.state, record.path, row.fix_stamp_ns, row.lever_arm_base_m),
                    record.state,
@@ -198,8 +205,10 @@ void RowHistory::overwrite(std::size_t anchor, const StateUpdate& update) {
       predict_row(at_fix.state, at_fix.path, update.fix_stamp_ns, update.lever_arm_base_m)
           .position_map_m;
   Vector3d shift_map_m = Vector3d::Zero();
-  for (const int axis : admitted_axes(update)) {
-    shift_map_m[axis] = update.position_map_m[axis] - predicted_map_m[axis];
+  for (int axis = 0; axis < 3; ++axis) {
+    if (is_admitted(update, axis)) {
+      shift_map_m[axis] = update.position_map_m[axis] - predicted_map_m[axis];
+    }
   }
   const Vector3d shift_odom_m = from_yaw(at_fix.state.T_map_odom.yaw_rad).conjugate() * shift_map_m;
   for (std::size_t j = anchor; j < records_.size(); ++j) {

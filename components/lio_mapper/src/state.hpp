@@ -29,7 +29,6 @@ inline constexpr int kPose = 6;  ///< position and rotation come first
 
 using ErrorVector = Eigen::Matrix<double, error::kSize, 1>;
 using ErrorMatrix = Eigen::Matrix<double, error::kSize, error::kSize>;
-using ErrorRows = Eigen::Matrix<double, Eigen::Dynamic, error::kSize, 0, 3, error::kSize>;
 
 struct State {
   Pose T_odom_base;
