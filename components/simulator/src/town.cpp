@@ -201,8 +201,8 @@ class Builder {
     const double free_path_m = random_.uniform(0.6, 1.8);
     const Eigen::Vector2d at =
         beside(place, side, config_.road_half_width_m + random_.uniform(1.0, 5.0));
-    if (!claim({at, Eigen::Vector2d::Constant(radius_m), 0.0},
-               std::max(config_.road_half_width_m, crown_m + 0.8))) {
+    if (!claim({at, Eigen::Vector2d::Constant(0.6 * crown_m), 0.0},
+               std::max(config_.road_half_width_m - 0.6 * crown_m, 0.4 * crown_m + 0.8))) {
       return;
     }
     add_cylinder(at, radius_m, trunk_m + 0.3 * tall_m, 0.35);

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "trigpoint/recording/rosbag2_writer.hpp"
+#include "trigpoint/simulator/simulator.hpp"
+
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+#include <variant>
+
+namespace trigpoint::simulator {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+void write_text(const fs::path& path, const std::string& text) {
+  std::ofstream file(path);
+  file << text;
+  file.close();
+  if (!file) {
+    throw std::runtime_error(path.string() +
+                             ": cannot be written (does the folder exist, is the disk full?)");
+  }
+}
+
+/// What a session's configuration needs to know of the robot and of the datum's place.
+std::string robot_overlay(RobotConfig robot) {
+  return "# The robot of a simulated drive: an overlay for the configuration.\n" +
+         print_config([&robot](ConfigFields& fields) {
+           fields.section("robot", "where the sensors sit", [&robot](ConfigFields& below) {
+             describe(robot, below);
+           });
+         });
+}
+
+const std::string& topic_of(const recording::Measurement& measurement, const RobotConfig& robot) {
+  if (std::holds_alternative<ImuSample>(measurement)) {
+    return robot.imu_topic;
+  }
+  return std::holds_alternative<GnssFix>(measurement) ? robot.fix_topic : robot.points_topic;
+}
+
+void write_log(ScenarioReader& reader, const std::string& folder, const Progress& progress) {
+  const RobotConfig robot = reader.scenario().robot;
+  recording::Rosbag2Writer writer(folder);
+  while (const auto entry = reader.next()) {
+    std::visit(
+        [&](const auto& message) {
+          writer.write(topic_of(entry->measurement, robot), entry->receive_ns, message);
+        },
+        entry->measurement);
+    if (progress) {
+      progress(reader.progress());
+    }
+  }
+  writer.close();
+}
+
+}  // namespace
+
+void simulate(const Scenario& scenario,
+              std::uint64_t seed,
+              std::optional<double> duration_s,
+              const std::string& out_dir,
+              const Progress& progress,
+              const StreamOptions& options) {
+  const fs::path out(out_dir);
+  std::error_code error;
+  fs::create_directories(out, error);
+  if (error) {
+    throw std::runtime_error(out_dir + ": cannot be created: " + error.message());
+  }
+  const auto reader = open_scenario(scenario, seed, duration_s, options);
+  const std::string made = "# simulated with seed " + std::to_string(seed) + ", " +
+                           std::to_string(duration_s.value_or(scenario.duration_s)) + " s\n";
+  write_text(out / "scenario.yaml", made + scenario.source_yaml);
+  write_text(out / "robot.yaml", robot_overlay(scenario.robot));
+  reader->write_truth((out / "truth.tum").string());
+  write_log(*reader, (out / "log").string(), progress);
+}
+
+}  // namespace trigpoint::simulator
