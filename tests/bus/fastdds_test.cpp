@@ -8,6 +8,7 @@
 #include "bus_fixture.hpp"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -59,7 +60,7 @@ TEST(SmallBuffers, still_carry_every_two_megabyte_cloud_and_imu_sample) {
   std::atomic<int> imu_heard{0};
   Subscription<sensor_msgs::msg::PointCloud2> cloud_reader(
       mapper, topics::points, [&](const auto& cloud, const MessageInfo&) {
-        damaged += cloud.data() != two_megabytes(cloud.height()).data() ? 1U : 0U;
+        damaged += cloud.data() != two_megabytes(cloud.height()).data ? 1U : 0U;
         clouds.add(cloud.height());
       });
   Subscription<sensor_msgs::msg::Imu> imu_reader(
@@ -96,6 +97,7 @@ TEST(SmallBuffers, still_carry_every_two_megabyte_cloud_and_imu_sample) {
 pid_t start_publisher(const Config& config) {
   const pid_t child = fork();
   if (child == 0) {
+    prctl(PR_SET_PDEATHSIG, SIGKILL);  // never outlives a test that fails
     Participant participant(config, "child");
     Publisher publisher(participant, topics::fix);
     while (true) {
