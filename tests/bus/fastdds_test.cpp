@@ -40,6 +40,45 @@ PointCloudMessage two_megabytes(std::uint32_t number) {
   return cloud;
 }
 
+// First: fork must come before Fast DDS has threads, also when all tests run in one process.
+/// A process that publishes on gps/fix until it is killed.
+pid_t start_publisher(const Config& config) {
+  const pid_t child = fork();
+  if (child == 0) {
+    prctl(PR_SET_PDEATHSIG, SIGKILL);  // never outlives a test that fails
+    Participant participant(config, "child");
+    Publisher publisher(participant, topics::fix);
+    while (true) {
+      publisher.publish(to_message(samples::fix()));
+      std::this_thread::sleep_for(20ms);
+    }
+  }
+  return child;
+}
+
+TEST(KilledProcess, is_noticed_within_its_lease) {
+  constexpr auto kNoticeLimit = 3s;  // lease of 2 s and a busy machine
+  const Config config = own_domain();
+  const pid_t child = start_publisher(config);  // before this process has threads
+  Participant participant(config, "parent");
+  Collected<std::string> lost;
+  Collected<std::string> writers;
+  Subscription<sensor_msgs::msg::NavSatFix> subscription(
+      participant,
+      topics::fix,
+      [](const auto&, const MessageInfo&) {},
+      {[&](const std::string& guid) { writers.add(guid); },
+       [&](const std::string& guid) { lost.add(guid); },
+       {}});
+  ASSERT_TRUE(writers.wait_for(1));
+  kill(child, SIGKILL);
+  waitpid(child, nullptr, 0);
+  const auto killed = std::chrono::steady_clock::now();
+  ASSERT_TRUE(lost.wait_for(1));
+  EXPECT_LE(std::chrono::steady_clock::now() - killed, kNoticeLimit);
+  EXPECT_EQ(lost.items(), writers.items());
+}
+
 TEST(SmallBuffers, are_told_with_their_size_and_the_remedy) {
   Collected<Event> events;
   Participant participant(small_buffers(), "small", [&](const Event& event) { events.add(event); });
@@ -91,44 +130,6 @@ TEST(SmallBuffers, still_carry_every_two_megabyte_cloud_and_imu_sample) {
   EXPECT_TRUE(clouds.wait_for(kClouds)) << clouds.size() << " of " << kClouds << " clouds arrived";
   EXPECT_EQ(damaged, 0U);
   EXPECT_EQ(imu_heard, imu_sent);
-}
-
-/// A process that publishes on gps/fix until it is killed.
-pid_t start_publisher(const Config& config) {
-  const pid_t child = fork();
-  if (child == 0) {
-    prctl(PR_SET_PDEATHSIG, SIGKILL);  // never outlives a test that fails
-    Participant participant(config, "child");
-    Publisher publisher(participant, topics::fix);
-    while (true) {
-      publisher.publish(to_message(samples::fix()));
-      std::this_thread::sleep_for(20ms);
-    }
-  }
-  return child;
-}
-
-TEST(KilledProcess, is_noticed_within_its_lease) {
-  constexpr auto kNoticeLimit = 3s;  // lease of 2 s and a busy machine
-  const Config config = own_domain();
-  const pid_t child = start_publisher(config);  // before this process has threads
-  Participant participant(config, "parent");
-  Collected<std::string> lost;
-  Collected<std::string> writers;
-  Subscription<sensor_msgs::msg::NavSatFix> subscription(
-      participant,
-      topics::fix,
-      [](const auto&, const MessageInfo&) {},
-      {[&](const std::string& guid) { writers.add(guid); },
-       [&](const std::string& guid) { lost.add(guid); },
-       {}});
-  ASSERT_TRUE(writers.wait_for(1));
-  kill(child, SIGKILL);
-  waitpid(child, nullptr, 0);
-  const auto killed = std::chrono::steady_clock::now();
-  ASSERT_TRUE(lost.wait_for(1));
-  EXPECT_LE(std::chrono::steady_clock::now() - killed, kNoticeLimit);
-  EXPECT_EQ(lost.items(), writers.items());
 }
 
 TEST(NetworkInterface, that_does_not_exist_is_refused_with_those_that_do) {
