@@ -23,9 +23,11 @@ constexpr double kClearlyBetter = 0.03;
 constexpr double kBackwardSpeed_mps = 4.0;
 constexpr double kLongestStep_s = 0.02;
 constexpr double kTiltMoving_rad = 0.1;
-constexpr double kTiltRelevelled_rad = 5e-3;
+/// The trial matches against a map that its own first motion built.
+constexpr double kTrialSigmaFactor = 2.0;
 constexpr double kVelocityMoving_mps = 0.5;
 constexpr int kRefinements = 2;
+constexpr int kTrials = 3;
 
 std::string sentence(const char* format, double a, double b = 0.0, double c = 0.0) {
   char text[400];
@@ -98,19 +100,38 @@ Vector3d find_velocity(const Config& config,
   return best.v_base_mps;
 }
 
-/// Gravity (base axes at the start) after a trial run over all sweeps that the IMU covers.
-Vector3d gravity_from_trial(const Config& config,
-                            const Pose& T_base_lidar,
-                            const ImuBuffer& imu,
-                            const std::deque<Sweep>& sweeps,
-                            const InitialState& initial) {
+/// A start as a trial run over the waiting sweeps corrects it.
+struct Relevelled {
+  Vector3d gravity_base_mps2;  ///< axes of base at the start
+  Vector3d v_base_mps;         ///< at the start
+  double tilt_sigma_rad;
+};
+
+/// Gravity and first velocity after a trial run over all sweeps that the IMU covers. The velocity
+/// at the end is known from the map; the IMU leads from there back to the start.
+Relevelled relevel(const Config& config,
+                   const Pose& T_base_lidar,
+                   const ImuBuffer& imu,
+                   const std::deque<Sweep>& sweeps,
+                   const InitialState& initial) {
   ScanFilter filter(config, T_base_lidar, initial);
   for (const Sweep& sweep : sweeps) {
     if (sweep.end_ns <= imu.newest_ns()) {
       filter.insert(filter.process(sweep, imu));
     }
   }
-  return initial.state.T_odom_base.q.conjugate() * filter.state().gravity_odom_mps2;
+  State unaided = filter.state();
+  unaided.T_odom_base = initial.state.T_odom_base;
+  unaided.v_odom_mps.setZero();
+  for (const InertialStep& step :
+       imu.steps_between(initial.stamp_ns, filter.stamp_ns(), kLongestStep_s)) {
+    unaided = propagate(unaided, step);
+  }
+  const Eigen::Quaterniond q_base_odom = initial.state.T_odom_base.q.conjugate();
+  const double variance = filter.covariance().diagonal().segment<2>(error::kGravity).maxCoeff();
+  return {q_base_odom * filter.state().gravity_odom_mps2,
+          q_base_odom * (filter.state().v_odom_mps - unaided.v_odom_mps),
+          kTrialSigmaFactor * std::sqrt(variance)};
 }
 
 Nanoseconds start_stamp(const ImuBuffer& imu, const std::deque<Sweep>& sweeps) {
@@ -228,12 +249,8 @@ InitialState level(const Vector3d& force_base_mps2,
 }
 
 bool can_start(const StartConfig& config, const ImuBuffer& imu, const std::deque<Sweep>& sweeps) {
-  if (imu.empty() || sweeps.size() < 2 || imu.newest_ns() < sweeps[1].end_ns) {
-    return false;
-  }
-  const Nanoseconds window_ns = from_seconds(config.window_s);
-  const Nanoseconds from_ns = std::max(imu.oldest_ns(), sweeps.front().begin_ns - window_ns);
-  return imu.newest_ns() - from_ns >= window_ns;
+  return !imu.empty() && sweeps.size() >= 2 && imu.newest_ns() >= sweeps[1].end_ns &&
+         to_seconds(imu.newest_ns() - sweeps.front().begin_ns) >= config.window_s;
 }
 
 StartResult start(const Config& config,
@@ -277,17 +294,24 @@ StartResult start(const Config& config,
         (force.norm() - kStandardGravity_mps2) * force.normalized();
     return result;
   }
-  const Vector3d gravity =
-      gravity_from_trial(config,
-                         T_base_lidar,
-                         imu,
-                         sweeps,
-                         with_velocity(result.initial, v_base, kVelocityMoving_mps));
-  result.initial =
-      level(-gravity,
-            stamp_ns,
-            config.imu,
-            {kTiltRelevelled_rad, kVelocityMoving_mps, config.imu.initial_gyro_bias_sigma_radps});
+  for (int i = 0; i < kTrials; ++i) {
+    const Relevelled found = relevel(config,
+                                     T_base_lidar,
+                                     imu,
+                                     sweeps,
+                                     with_velocity(result.initial, v_base, kVelocityMoving_mps));
+    v_base = found.v_base_mps;
+    // The prior of the next trial is as open as the first one's: the same data must not count
+    // twice.
+    const bool last = i + 1 == kTrials;
+    result.initial = level(-found.gravity_base_mps2,
+                           stamp_ns,
+                           config.imu,
+                           {last ? found.tilt_sigma_rad : kTiltMoving_rad,
+                            kVelocityMoving_mps,
+                            config.imu.initial_gyro_bias_sigma_radps});
+  }
+  result.speed_mps = v_base.norm();
   result.initial = with_velocity(result.initial, v_base, kVelocityMoving_mps);
   return result;
 }
