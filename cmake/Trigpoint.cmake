@@ -40,9 +40,10 @@ function(trigpoint_program name)
 endfunction()
 
 # trigpoint_test(<name> SOURCES ... LIBS ... [LABELS ...] [TIMEOUT s]): one GoogleTest binary in
-# bin/, each TEST a ctest of its own. The label "long" keeps a test out of the default run.
+# bin/, each TEST a ctest of its own, or all as one with WHOLE (then it runs alone). The label "long"
+# keeps a test out of the default run.
 function(trigpoint_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LIBS;LABELS" ${ARGN})
+  cmake_parse_arguments(ARG "WHOLE" "TIMEOUT" "SOURCES;LIBS;LABELS" ${ARGN})
   if(NOT TRIGPOINT_BUILD_TESTS)
     return()
   endif()
@@ -54,5 +55,10 @@ function(trigpoint_test name)
   target_compile_definitions(${name} PRIVATE TRIGPOINT_SHARED_DATA="${TRIGPOINT_SHARED_DATA}" TRIGPOINT_SOURCE_DIR="${PROJECT_SOURCE_DIR}" TRIGPOINT_BIN_DIR="${CMAKE_BINARY_DIR}/bin")
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
   trigpoint_warnings(${name})
+  if(ARG_WHOLE)
+    add_test(NAME ${name} COMMAND ${name})
+    set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}" RUN_SERIAL ON)
+    return()
+  endif()
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}")
 endfunction()

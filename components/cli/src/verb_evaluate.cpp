@@ -53,7 +53,7 @@ void print_alignments(const std::vector<PosePair>& pairs) {
        {AlignmentKind::kNone, AlignmentKind::kYawTranslation, AlignmentKind::kSe3}) {
     const std::optional<Pose> T = align(pairs, kind);
     if (T) {
-      print_absolute(name_of(kind), absolute_error(apply(*T, pairs)));
+      print_absolute(name_of(kind), absolute_error(place_estimates(*T, pairs)));
     } else {
       std::printf("%-18s not determined: too few poses, or all on one line\n",
                   name_of(kind).c_str());

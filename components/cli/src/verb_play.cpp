@@ -5,6 +5,7 @@
 #include "trigpoint/shell/shell.hpp"
 #include "trigpoint/shell/stop_signal.hpp"
 
+#include "finish_session.hpp"
 #include "input.hpp"
 #include "player.hpp"
 #include "progress.hpp"

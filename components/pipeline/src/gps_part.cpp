@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "trigpoint/pipeline/session_parts.hpp"
+
+namespace trigpoint::pipeline {
+
+namespace file = exporter::session_file;
+using exporter::path_in;
+
+GpsPart::GpsPart(const std::string& session)
+    : session_(session),
+      trajectory_(path_in(session, file::kGps), "base_link in map, GPS odometry"),
+      statuses_(path_in(session, file::kGpsStatus)),
+      counts_(session, "gps_odometry") {}
+
+void GpsPart::on_odometry(const Odometry& odometry) {
+  trajectory_.append(odometry.stamp_ns, odometry.T_frame_child);
+}
+
+void GpsPart::on_status(const GpsStatus& status) {
+  statuses_.append(status);
+  last_ = status;
+}
+
+void GpsPart::on_datum(const Datum& datum) {
+  exporter::write_datum(path_in(session_, file::kDatum), datum);
+}
+
+void GpsPart::close() {
+  counts_.write(exporter::counts_of(last_));
+}
+
+}  // namespace trigpoint::pipeline

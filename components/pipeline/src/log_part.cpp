@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "trigpoint/pipeline/session_parts.hpp"
+
+#include <variant>
+
+namespace trigpoint::pipeline {
+
+namespace file = exporter::session_file;
+using exporter::path_in;
+
+LogPart::LogPart(const std::string& session)
+    : fixes_(path_in(session, file::kFixes)), counts_(session, "log") {}
+
+void LogPart::on_entry(const recording::LogEntry& entry) {
+  if (first_ns_ == 0) {
+    first_ns_ = entry.receive_ns;
+  }
+  last_ns_ = entry.receive_ns;
+  if (const auto* fix = std::get_if<GnssFix>(&entry.measurement)) {
+    fixes_.append(*fix, entry.receive_ns, entry.withheld);
+    ++(entry.withheld ? fixes_withheld_ : fixes_fed_);
+  } else if (std::holds_alternative<ImuSample>(entry.measurement)) {
+    ++imu_;
+  } else {
+    ++sweeps_;
+  }
+}
+
+void LogPart::close() {
+  counts_.write({{"points.in_log", sweeps_},
+                 {"points.published", sweeps_},
+                 {"imu.in_log", imu_},
+                 {"imu.published", imu_},
+                 {"fix.in_log", fixes_fed_ + fixes_withheld_},
+                 {"fix.withheld", fixes_withheld_},
+                 {"fix.published", fixes_fed_}});
+}
+
+}  // namespace trigpoint::pipeline
