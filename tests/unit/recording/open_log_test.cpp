@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "trigpoint/recording/log.hpp"
+#include "trigpoint/recording/rosbag2_writer.hpp"
+
+#include "samples.hpp"
+#include "temporary_folder.hpp"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+namespace trigpoint::recording {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+class OpenLog : public testing::Test {
+ protected:
+  /// Ten seconds of IMU at 100 Hz, fixes and clouds at 10 Hz, on LIO-SAM's topics.
+  std::string recorded() {
+    const auto path = (folder_ / "log").string();
+    Rosbag2Writer writer(path);
+    for (int i = 0; i < 1000; ++i) {
+      writer.write("imu_raw", sample_imu(i).stamp_ns, sample_imu(i));
+      if (i % 10 == 0) {
+        writer.write("gps/fix", sample_fix(i / 10).stamp_ns, sample_fix(i / 10));
+        writer.write("points_raw", sample_cloud(i / 10).stamp_ns, sample_cloud(i / 10, 1));
+      }
+    }
+    return path;
+  }
+
+  static RobotConfig robot() {
+    RobotConfig robot;
+    robot.points_topic = "/points_raw";
+    robot.imu_topic = "imu_raw";
+    return robot;
+  }
+
+  std::string refusal(const std::string& path, const RobotConfig& robot) {
+    return message_of<LogError>([&] { open_log(path, robot); });
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(OpenLog, maps_topics_with_and_without_a_leading_slash) {
+  const auto entries = read_all(*open_log(recorded(), robot()));
+  EXPECT_EQ(1000U, only<ImuSample>(entries).size());
+  EXPECT_EQ(100U, only<GnssFix>(entries).size());
+  EXPECT_EQ(100U, only<PointCloudMessage>(entries).size());
+}
+
+TEST_F(OpenLog, names_an_unknown_topic_the_nearest_one_and_all_there_are) {
+  auto wrong = robot();
+  wrong.imu_topic = "imu_row";
+  EXPECT_THAT(refusal(recorded(), wrong),
+              AllOf(HasSubstr("'imu_row'"),
+                    HasSubstr("robot.imu_topic"),
+                    HasSubstr("did you mean '/imu_raw'?"),
+                    HasSubstr("/points_raw (sensor_msgs/msg/PointCloud2, 100)")));
+}
+
+TEST_F(OpenLog, says_that_a_log_has_no_imu_at_all) {
+  const auto path = (folder_ / "log").string();
+  {
+    Rosbag2Writer writer(path);
+    writer.write("points", kStart_ns, sample_cloud(0));
+    writer.write("gps/fix", kStart_ns, sample_fix(0));
+  }
+  EXPECT_THAT(refusal(path, RobotConfig{}),
+              AllOf(HasSubstr("'imu/data'"),
+                    HasSubstr("no topic of type sensor_msgs/msg/Imu is in the log")));
+}
+
+TEST_F(OpenLog, refuses_a_topic_of_another_type) {
+  auto wrong = robot();
+  wrong.points_topic = "imu_raw";
+  EXPECT_THAT(refusal(recorded(), wrong),
+              AllOf(HasSubstr("is of type sensor_msgs/msg/Imu"),
+                    HasSubstr("expected sensor_msgs/msg/PointCloud2"),
+                    HasSubstr("'/points_raw'")));
+}
+
+TEST_F(OpenLog, refuses_what_is_no_log) {
+  EXPECT_THAT(refusal((folder_ / "nothing.bag").string(), RobotConfig{}),
+              AllOf(HasSubstr("nothing.bag"), HasSubstr("does not exist")));
+  std::ofstream(folder_ / "empty.bag");
+  EXPECT_THAT(refusal((folder_ / "empty.bag").string(), RobotConfig{}), HasSubstr("empty"));
+  std::ofstream(folder_ / "notes.txt") << "hello";
+  EXPECT_THAT(refusal((folder_ / "notes.txt").string(), RobotConfig{}),
+              HasSubstr("no log that is known here"));
+}
+
+TEST_F(OpenLog, refuses_an_empty_log) {
+  const auto path = (folder_ / "log").string();
+  {
+    Rosbag2Writer writer(path);
+    writer.declare_topic("imu/data", "sensor_msgs/msg/Imu", Durability::kVolatile);
+  }
+  EXPECT_THAT(refusal(path, RobotConfig{}), HasSubstr("empty"));
+}
+
+TEST_F(OpenLog, does_without_a_topic_that_is_not_required) {
+  auto without = robot();
+  without.points_topic = "elsewhere";
+  LogOptions options;
+  options.require_points = false;
+  const auto entries = read_all(*open_log(recorded(), without, options));
+  EXPECT_EQ(1100U, entries.size());
+}
+
+TEST_F(OpenLog, withholds_fixes_beyond_the_rate_but_delivers_them) {
+  LogOptions options;
+  options.fix_rate_limit_hz = 1.0;
+  const auto entries = read_all(*open_log(recorded(), robot(), options));
+  std::vector<Nanoseconds> fed;
+  int withheld = 0;
+  for (const auto& entry : entries) {
+    if (const auto* fix = std::get_if<GnssFix>(&entry.measurement)) {
+      if (entry.withheld) {
+        ++withheld;
+      } else {
+        fed.push_back(fix->stamp_ns);
+      }
+    } else {
+      EXPECT_FALSE(entry.withheld) << "only fixes are withheld";
+    }
+  }
+  EXPECT_EQ(100, withheld + static_cast<int>(fed.size()));
+  // 9.9 s of fixes: the first at once, then one a second.
+  EXPECT_EQ(11U, fed.size());
+  EXPECT_EQ(kStart_ns, fed[0]);
+  EXPECT_EQ(kNanosecondsPerSecond, fed[5] - fed[4]);
+}
+
+TEST_F(OpenLog, a_limit_at_the_rate_of_the_fixes_withholds_none) {
+  LogOptions options;
+  options.fix_rate_limit_hz = 10.0;
+  for (const auto& entry : read_all(*open_log(recorded(), robot(), options))) {
+    EXPECT_FALSE(entry.withheld);
+  }
+}
+
+TEST_F(OpenLog, delivers_the_part_that_was_asked_for) {
+  LogOptions options;
+  options.start_s = 2.0;
+  options.duration_s = 3.0;
+  const auto log = open_log(recorded(), robot(), options);
+  const auto entries = read_all(*log);
+  EXPECT_EQ(kStart_ns + 2 * kNanosecondsPerSecond, entries.front().receive_ns);
+  EXPECT_EQ(kStart_ns + 5 * kNanosecondsPerSecond, entries.back().receive_ns);
+  EXPECT_EQ(1.0, log->progress());
+}
+
+TEST_F(OpenLog, finds_the_truth_beside_a_simulated_log) {
+  const auto path = recorded();
+  EXPECT_FALSE(open_log(path, robot())->truth_file());
+  std::ofstream(folder_ / "truth.tum") << "# t x y z qx qy qz qw\n";
+  EXPECT_EQ((folder_ / "truth.tum").string(), open_log(path, robot())->truth_file().value_or(""));
+  EXPECT_EQ((folder_ / "truth.tum").string(),
+            open_log(path + "/", robot())->truth_file().value_or(""));
+  EXPECT_EQ((folder_ / "truth.tum").string(),
+            open_log(path + "/log_0.db3", robot())->truth_file().value_or(""));
+}
+
+}  // namespace
+}  // namespace trigpoint::recording

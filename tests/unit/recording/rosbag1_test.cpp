@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "trigpoint/recording/log.hpp"
+
+#include "samples.hpp"
+#include "temporary_folder.hpp"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <rosbag/bag.h>
+#include <sensor_msgs/Imu.h>
+#include <sensor_msgs/NavSatFix.h>
+#include <sensor_msgs/PointCloud2.h>
+
+#include <fstream>
+
+namespace trigpoint::recording {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::HasSubstr;
+
+ros::Time ros_time(Nanoseconds stamp_ns) {
+  return {static_cast<std::uint32_t>(stamp_ns / kNanosecondsPerSecond),
+          static_cast<std::uint32_t>(stamp_ns % kNanosecondsPerSecond)};
+}
+
+// The messages as ROS 1's own generated code writes them: independent of our decoder.
+sensor_msgs::Imu ros_imu(const ImuSample& imu) {
+  sensor_msgs::Imu message;
+  message.header.stamp = ros_time(imu.stamp_ns);
+  message.header.frame_id = imu.frame_id;
+  message.orientation.w = imu.q_world_base->w();
+  message.orientation.x = imu.q_world_base->x();
+  message.orientation.y = imu.q_world_base->y();
+  message.orientation.z = imu.q_world_base->z();
+  message.angular_velocity.x = imu.gyro_radps.x();
+  message.angular_velocity.y = imu.gyro_radps.y();
+  message.angular_velocity.z = imu.gyro_radps.z();
+  message.linear_acceleration.x = imu.accel_mps2.x();
+  message.linear_acceleration.y = imu.accel_mps2.y();
+  message.linear_acceleration.z = imu.accel_mps2.z();
+  return message;
+}
+
+sensor_msgs::NavSatFix ros_fix(const GnssFix& fix) {
+  sensor_msgs::NavSatFix message;
+  message.header.stamp = ros_time(fix.stamp_ns);
+  message.status.status = static_cast<std::int8_t>(fix.status);
+  message.status.service = fix.service;
+  message.latitude = fix.latitude_deg;
+  message.longitude = fix.longitude_deg;
+  message.altitude = fix.altitude_m;
+  for (int i = 0; i < 9; ++i) {
+    message.position_covariance[static_cast<std::size_t>(i)] = fix.covariance_enu_m2(i / 3, i % 3);
+  }
+  message.position_covariance_type = static_cast<std::uint8_t>(fix.covariance_type);
+  return message;
+}
+
+sensor_msgs::PointCloud2 ros_cloud(const PointCloudMessage& cloud) {
+  sensor_msgs::PointCloud2 message;
+  message.header.stamp = ros_time(cloud.stamp_ns);
+  message.header.frame_id = cloud.frame_id;
+  message.height = cloud.height;
+  message.width = cloud.width;
+  for (const auto& field : cloud.fields) {
+    sensor_msgs::PointField ros_field;
+    ros_field.name = field.name;
+    ros_field.offset = field.offset;
+    ros_field.datatype = field.datatype;
+    ros_field.count = field.count;
+    message.fields.push_back(ros_field);
+  }
+  message.point_step = cloud.point_step;
+  message.row_step = cloud.row_step;
+  message.data = cloud.data;
+  message.is_dense = 1;
+  return message;
+}
+
+/// Two seconds, as a ROS 1 recorder writes them, in chunks of about 20 kB.
+fs::path record(const fs::path& file, rosbag::CompressionType compression) {
+  constexpr std::uint32_t kChunk_bytes = 20'000;
+  rosbag::Bag bag(file.string(), rosbag::bagmode::Write);
+  bag.setCompression(compression);
+  bag.setChunkThreshold(kChunk_bytes);
+  for (int i = 0; i < 200; ++i) {
+    bag.write("/imu/data", ros_time(sample_imu(i).stamp_ns), ros_imu(sample_imu(i)));
+    if (i % 10 == 0) {
+      bag.write("/gps/fix", ros_time(sample_fix(i / 10).stamp_ns), ros_fix(sample_fix(i / 10)));
+      bag.write(
+          "/points", ros_time(sample_cloud(i / 10).stamp_ns), ros_cloud(sample_cloud(i / 10)));
+    }
+  }
+  bag.close();
+  return file;
+}
+
+void expect_the_samples(const std::vector<LogEntry>& entries,
+                        std::size_t imu_at_least,
+                        std::size_t clouds_at_least) {
+  const auto imu = only<ImuSample>(entries);
+  ASSERT_GE(imu.size(), imu_at_least);
+  for (std::size_t i = 0; i < imu.size(); ++i) {
+    const auto expected = sample_imu(static_cast<int>(i));
+    ASSERT_EQ(expected.stamp_ns, imu[i].stamp_ns);
+    ASSERT_EQ(expected.gyro_radps, imu[i].gyro_radps);
+    ASSERT_EQ(expected.accel_mps2, imu[i].accel_mps2);
+    ASSERT_TRUE(imu[i].q_world_base && imu[i].q_world_base->isApprox(*expected.q_world_base));
+  }
+  const auto fixes = only<GnssFix>(entries);
+  for (std::size_t i = 0; i < fixes.size(); ++i) {
+    ASSERT_EQ(sample_fix(static_cast<int>(i)).latitude_deg, fixes[i].latitude_deg);
+    ASSERT_EQ(sample_fix(static_cast<int>(i)).covariance_enu_m2, fixes[i].covariance_enu_m2);
+    ASSERT_EQ(FixStatus::kGbas, fixes[i].status);
+    ASSERT_EQ(CovarianceType::kKnown, fixes[i].covariance_type);
+  }
+  const auto clouds = only<PointCloudMessage>(entries);
+  ASSERT_GE(clouds.size(), clouds_at_least);
+  for (std::size_t i = 0; i < clouds.size(); ++i) {
+    ASSERT_EQ(sample_cloud(static_cast<int>(i)).data, clouds[i].data);
+    ASSERT_EQ("time", clouds[i].fields.at(3).name);
+    ASSERT_EQ(16U, clouds[i].point_step);
+  }
+}
+
+class Rosbag1 : public testing::TestWithParam<rosbag::CompressionType> {
+ protected:
+  TemporaryFolder folder_;
+};
+
+TEST_P(Rosbag1, decodes_what_ros_wrote) {
+  const auto log = open_log(record(folder_ / "drive.bag", GetParam()).string(), RobotConfig{});
+  EXPECT_EQ("rosbag1", log->summary().format);
+  EXPECT_EQ(kStart_ns, log->summary().first_ns);
+  const auto entries = read_all(*log);
+  EXPECT_EQ(240U, entries.size());
+  expect_the_samples(entries, 200, 20);
+}
+
+TEST_P(Rosbag1, a_truncated_bag_delivers_what_came_before_then_says_so) {
+  const auto file = record(folder_ / "drive.bag", GetParam());
+  // Without the index at the end, and a part of the last chunk.
+  fs::resize_file(file, fs::file_size(file) * 2 / 3);
+  const auto log = open_log(file.string(), RobotConfig{});
+  std::vector<LogEntry> entries;
+  const auto told = message_of<LogError>([&] {
+    while (auto entry = log->next()) {
+      entries.push_back(*entry);
+    }
+  });
+  EXPECT_THAT(told, AllOf(HasSubstr("breaks off after"), HasSubstr("drive.bag")));
+  EXPECT_LT(entries.size(), 240U);
+  expect_the_samples(entries, 50, 5);
+}
+
+INSTANTIATE_TEST_SUITE_P(Compressions,
+                         Rosbag1,
+                         testing::Values(rosbag::compression::Uncompressed,
+                                         rosbag::compression::BZ2,
+                                         rosbag::compression::LZ4),
+                         [](const auto& param) {
+                           return param.param == rosbag::compression::Uncompressed ? "none"
+                                  : param.param == rosbag::compression::BZ2        ? "bz2"
+                                                                                   : "lz4";
+                         });
+
+TEST(Rosbag1Real, needs_points_unless_told_otherwise) {
+  const std::string file = std::string(TRIGPOINT_SHARED_DATA) + "/robot_localization/test1.bag";
+  if (!fs::exists(file)) {
+    GTEST_SKIP() << "needs the recorded bag " << file;
+  }
+  RobotConfig robot;
+  robot.fix_topic = "fix";
+  EXPECT_THAT(message_of<LogError>([&] { open_log(file, robot); }),
+              AllOf(HasSubstr("'points'"),
+                    HasSubstr("no topic of type sensor_msgs/msg/PointCloud2"),
+                    HasSubstr("/imu/data")));
+  LogOptions options;
+  options.require_points = false;
+  const auto entries = read_all(*open_log(file, robot, options));
+  const auto fixes = only<GnssFix>(entries);
+  EXPECT_EQ(989U, fixes.size()) << "as the data's README counts them";
+  double force_mps2 = 0.0;
+  const auto imu = only<ImuSample>(entries);
+  for (const auto& sample : imu) {
+    force_mps2 += sample.accel_mps2.norm() / static_cast<double>(imu.size());
+  }
+  EXPECT_NEAR(9.8, force_mps2, 0.3) << "gravity is in the specific force";
+  EXPECT_NEAR(395.0, to_seconds(entries.back().receive_ns - entries.front().receive_ns), 2.0);
+}
+
+TEST(Rosbag1Real, refuses_a_file_that_is_no_bag) {
+  TemporaryFolder folder;
+  std::ofstream(folder / "not.bag") << "this is not a bag, but it is named like one";
+  EXPECT_THAT(message_of<LogError>([&] { open_log((folder / "not.bag").string(), RobotConfig{}); }),
+              AllOf(HasSubstr("not.bag"), HasSubstr("ROSBAG V2.0")));
+}
+
+}  // namespace
+}  // namespace trigpoint::recording
