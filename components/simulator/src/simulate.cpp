@@ -24,7 +24,7 @@ void write_text(const fs::path& path, const std::string& text) {
   }
 }
 
-/// What a session's configuration needs to know of the robot and of the datum's place.
+/// What the configuration of the processes needs to know of the robot.
 std::string robot_overlay(RobotConfig robot) {
   return "# The robot of a simulated drive: an overlay for the configuration.\n" +
          print_config([&robot](ConfigFields& fields) {
@@ -70,6 +70,11 @@ void simulate(const Scenario& scenario,
   fs::create_directories(out, error);
   if (error) {
     throw std::runtime_error(out_dir + ": cannot be created: " + error.message());
+  }
+  // Before anything is written: another drive's log must not end up beside this one's truth.
+  if (const fs::path log = out / "log"; fs::exists(log, error) && !fs::is_empty(log, error)) {
+    throw recording::LogError(
+        log.string() + ": exists already and is not empty; choose another folder or remove it");
   }
   const auto reader = open_scenario(scenario, seed, duration_s, options);
   const std::string made = "# simulated with seed " + std::to_string(seed) + ", " +
