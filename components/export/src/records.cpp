@@ -249,7 +249,7 @@ std::vector<NamedCount> counts_of(const LioStatus& status) {
 }
 
 std::vector<NamedCount> counts_of(const FusionStatus& status) {
-  std::vector<NamedCount> counts{{"fix.received", status.fixes_seen},
+  std::vector<NamedCount> counts{{"fix.judged", status.fixes_seen},
                                  {"fix.used", status.fixes_used}};
   for (const auto& [reason, count] : status.verdicts) {
     counts.push_back({"fix.verdict." + reason, count});

@@ -182,8 +182,8 @@ RunInfo read_run(const std::string& file);
 
 /// <program>.counts.yaml: `name: number` lines, replaced whole at each write. Names are
 /// `<stream>.<what>[.<reason>]`, stream one of points, imu, fix; what one of in_log, published,
-/// withheld, received, used, refused, verdict (of the gate, kinds of use among them). The report
-/// compares them along the way of each stream.
+/// withheld, received, used, refused, and of the gate judged, verdict (kinds of use among them).
+/// The report compares them along the way of each stream.
 class CountsWriter {
  public:
   CountsWriter(const std::string& folder, const std::string& program);

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// report.md and the pictures of a session.
+#pragma once
+
+#include <Eigen/Core>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace trigpoint::evaluation {
+
+struct ReportOptions {
+  bool pictures{true};
+  std::string gnuplot{"gnuplot"};  ///< program
+  /// Lever arm for scoring against fixes. Without: robot.antenna_position_base_m of the session's
+  /// config.yaml, else zero, which the report then says.
+  std::optional<Eigen::Vector3d> antenna_position_base_m;
+};
+
+struct ReportResult {
+  std::string report_file;
+  std::string text;                   ///< summary and table for the terminal (Markdown)
+  std::vector<std::string> pictures;  ///< PNG files written
+  /// What the session lacks or what failed, one sentence each; they stand in report.md too.
+  std::vector<std::string> problems;
+  /// There was a trajectory to report on, every file in the session could be read, and every
+  /// picture that was asked for is there. The exit code should follow this.
+  bool complete{false};
+};
+
+/// Reads the session, writes report.md, and the pictures trajectories.png, uncertainty.png and
+/// scan_times.png with their gnuplot scripts and data in plots/. What is missing or damaged is told
+/// in `problems` and the rest is still reported. Throws std::runtime_error only when the folder
+/// does not exist or report.md cannot be written.
+ReportResult write_report(const std::string& session_folder, const ReportOptions& options = {});
+
+}  // namespace trigpoint::evaluation

@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "fix_reference.hpp"
+#include "gnuplot.hpp"
+#include "pictures.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <sstream>
+
+namespace trigpoint::evaluation {
+
+namespace {
+
+namespace file = exporter::session_file;
+
+constexpr int kWidth_px = 1300;
+constexpr int kPanelHeight_px = 230;
+constexpr double kLowestSigma_m = 1e-3;
+constexpr double kUnknownSigma_m = 500.0;  ///< sqrt(kUnknownVariance) is 1000
+constexpr std::array<const char*, 3> kAxisNames{"east", "north", "up"};
+constexpr std::array<const char*, 3> kAxisFiles{"east.dat", "north.dat", "up.dat"};
+/// By AxisSource.
+constexpr std::array<const char*, 4> kSourceNames{"none", "lio", "fused", "gps"};
+constexpr std::array<const char*, 4> kSourceColours{"#d9d9d9", "#f7c59f", "#b9e3c0", "#b7d4f0"};
+constexpr const char* kOutageColour = "#8c2d2d";
+
+/// Vertical extent of a panel with a logarithmic scale.
+struct SigmaRange {
+  double lowest_m{0.01};
+  double highest_m{1.0};
+};
+
+SigmaRange sigma_range(const std::vector<FusionStatus>& rows, std::size_t axis) {
+  SigmaRange range;
+  for (const auto& row : rows) {
+    for (const double value_m : {row.axes.at(axis).sigma_m, row.axes.at(axis).threshold_m}) {
+      if (std::isfinite(value_m) && value_m > 0.0 && value_m < kUnknownSigma_m) {
+        range.lowest_m = std::min(range.lowest_m, std::max(value_m, kLowestSigma_m));
+        range.highest_m = std::max(range.highest_m, value_m);
+      }
+    }
+  }
+  return {range.lowest_m / 1.5, range.highest_m * 2.5};
+}
+
+class UncertaintyPicture {
+ public:
+  explicit UncertaintyPicture(const SessionData& data)
+      : data_(data),
+        picture_(data.path(file::kPlots), "uncertainty"),
+        span_(data.span()),
+        outages_(data.outages()) {}
+
+  std::string draw(const std::string& gnuplot) {
+    std::ostringstream body;
+    const bool has_error = !data_.truth.empty();
+    const int panels = has_error ? 5 : 4;
+    body << "set multiplot layout " << panels << ",1 margins 0.075,0.86,0.05,0.97 spacing 0.035\n"
+         << "set xrange [0:" << std::max(1.0, time(span_.end_ns)) << "]\n"
+         << "set grid lc rgb '#dddddd'\nset tics out nomirror\nset key outside right top\n"
+         << "set style fill solid 1.0 noborder\nset format x ''\n";
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      body << sigma_panel(axis);
+    }
+    body << "unset logscale y\nset format y '%g'\n";
+    body << (has_error ? "" : "set format x '%g'\nset xlabel 'time [s]'\n") << height_panel();
+    if (has_error) {
+      body << "set format x '%g'\nset xlabel 'time [s]'\n" << error_panel();
+    }
+    body << "unset multiplot\n";
+    return picture_.draw(gnuplot, kWidth_px, panels * kPanelHeight_px + 40, body.str());
+  }
+
+ private:
+  double time(Nanoseconds stamp_ns) const { return seconds_since(span_.begin_ns, stamp_ns); }
+
+  /// Rectangles x y xlow xhigh ylow yhigh of the runs in which the gate chose one source.
+  DataFile source_boxes(std::size_t axis, AxisSource source, const SigmaRange& range) const {
+    DataFile boxes;
+    const auto& rows = data_.gate;
+    for (std::size_t i = 0; i < rows.size();) {
+      std::size_t end = i + 1;
+      while (end < rows.size() && rows[end].axes.at(axis).source == rows[i].axes.at(axis).source) {
+        ++end;
+      }
+      const double from = time(rows[i].stamp_ns);
+      const double to = time(rows[std::min(end, rows.size() - 1)].stamp_ns);
+      if (rows[i].axes.at(axis).source == source && to > from) {
+        boxes.add({from, range.lowest_m, from, to, range.lowest_m, range.highest_m});
+      }
+      i = end;
+    }
+    return boxes;
+  }
+
+  /// A bar along the upper edge of the panel.
+  std::string outage_boxes(const std::string& name, double lowest, double highest) const {
+    DataFile boxes;
+    for (const auto& window : outages_) {
+      const double from = time(window.begin_ns);
+      boxes.add({from, lowest, from, time(window.end_ns), lowest, highest});
+    }
+    return boxes.is_empty()
+               ? std::string()
+               : picture_.data(name, boxes) + " using 1:2:3:4:5:6 with boxxyerror lc rgb '" +
+                     kOutageColour + "' title 'GPS outage', \\\n     ";
+  }
+
+  std::string sigma_panel(std::size_t axis) {
+    const std::string name = kAxisNames.at(axis);
+    const auto range = sigma_range(data_.gate, axis);
+    std::ostringstream text;
+    text << "set logscale y\nset format y '%g'\nset ylabel 'sigma " << name << " [m]'\n"
+         << "set yrange [" << range.lowest_m << ":" << range.highest_m << "]\nplot ";
+    for (std::size_t source = 0; source < kSourceNames.size(); ++source) {
+      const auto boxes = source_boxes(axis, static_cast<AxisSource>(source), range);
+      const std::string source_file = name + "_" + kSourceNames.at(source) + ".box";
+      if (!boxes.is_empty()) {
+        text << picture_.data(source_file, boxes) << " using 1:2:3:4:5:6 with boxxyerror lc rgb '"
+             << kSourceColours.at(source) << "' title 'gate: " << kSourceNames.at(source)
+             << "', \\\n     ";
+      }
+    }
+    text << outage_boxes(name + "_outage.box", range.highest_m / 1.35, range.highest_m);
+    const auto quoted = picture_.data(kAxisFiles.at(axis), sigma_rows(axis));
+    text << quoted << " using 1:2 with lines lw 2 lc rgb '#1f6fbf' title 'GPS odometry sigma', "
+         << "\\\n     " << quoted
+         << " using 1:3 with lines lw 1.5 dt 2 lc rgb '#c00000' title 'threshold', \\\n     "
+         << picture_.data("alignment_" + std::string(kAxisFiles.at(axis)), alignment_rows(axis))
+         << " using 1:2 with lines lw 1.5 lc rgb '#555555' title 'alignment sigma'\n";
+    return text.str();
+  }
+
+  DataFile sigma_rows(std::size_t axis) const {
+    DataFile rows;
+    for (const auto& row : data_.gate) {
+      rows.add({time(row.stamp_ns), row.axes.at(axis).sigma_m, row.axes.at(axis).threshold_m});
+    }
+    return with_a_row(std::move(rows));
+  }
+
+  DataFile alignment_rows(std::size_t axis) const {
+    DataFile rows;
+    for (const auto& row : data_.gate) {
+      rows.add({time(row.stamp_ns), row.position_sigma_m.at(axis)});
+    }
+    return with_a_row(std::move(rows));
+  }
+
+  /// gnuplot calls a file without rows an error; this one lies outside every range.
+  static DataFile with_a_row(DataFile rows) {
+    if (rows.is_empty()) {
+      rows.add({-1.0, 1.0, 1.0});
+    }
+    return rows;
+  }
+
+  std::string curve(const std::string& name,
+                    const std::string& title,
+                    const std::vector<Eigen::Vector2d>& points,
+                    const std::string& style) const {
+    if (points.empty()) {
+      return "";
+    }
+    DataFile rows;
+    for (const auto& point : points) {
+      rows.add({point.x(), point.y()});
+    }
+    return picture_.data(name, rows) + " using 1:2 with " + style + " title '" + title + "'";
+  }
+
+  std::vector<Eigen::Vector2d> heights(const Trajectory& trajectory, const Pose& T = Pose{}) const {
+    std::vector<Eigen::Vector2d> points;
+    for (const auto& [stamp_ns, pose] : thinned(trajectory)) {
+      points.emplace_back(time(stamp_ns), (T * pose.p).z());
+    }
+    return points;
+  }
+
+  std::vector<Eigen::Vector2d> errors(const Trajectory& trajectory, const Pose& T = Pose{}) const {
+    std::vector<Eigen::Vector2d> points;
+    const auto pairs = associate(thinned(trajectory), data_.truth).pairs;
+    for (const auto& pair : pairs) {
+      points.emplace_back(time(pair.stamp_ns), (T * pair.estimate.p - pair.reference.p).norm());
+    }
+    return points;
+  }
+
+  /// Joins the curves that there are; a panel always has one.
+  static std::string plot(const std::vector<std::string>& curves) {
+    std::string text;
+    for (const auto& curve : curves) {
+      if (!curve.empty()) {
+        text += (text.empty() ? "" : ", \\\n     ") + curve;
+      }
+    }
+    return "set yrange [*:*]\nplot " + (text.empty() ? "1/0 notitle" : text) + "\n";
+  }
+
+  std::string height_panel() const {
+    const auto T_map_odom = lio_placement(data_);
+    Trajectory fixes;
+    if (data_.datum) {
+      fixes = fix_positions(data_.fixes, *data_.datum, FixChoice::kAll);
+    }
+    return "set ylabel 'z [m]'\n" +
+           plot({curve("fixes.z",
+                       "fixes (antenna)",
+                       heights(fixes),
+                       "points pt 2 ps 0.5 lc rgb '#7fb2e5'"),
+                 curve("truth.z", "truth", heights(data_.truth), "lines lw 4 lc rgb '#f2c230'"),
+                 curve("gps.z", "gps filter", heights(data_.gps), "lines lw 1 lc rgb '#1f6fbf'"),
+                 curve("lio.z",
+                       T_map_odom ? "lio (yaw + t)" : "lio (odom)",
+                       heights(data_.lio, T_map_odom.value_or(Pose{})),
+                       "lines lw 1.5 lc rgb '#e8772e'"),
+                 curve("fused.z", "fused", heights(data_.fused), "lines lw 2 lc rgb '#17853c'")});
+  }
+
+  std::string error_panel() const {
+    const auto T_map_odom = lio_placement(data_);
+    return "set ylabel 'error [m]'\n" +
+           plot(
+               {curve("gps.error", "gps filter", errors(data_.gps), "lines lw 1 lc rgb '#1f6fbf'"),
+                T_map_odom ? curve("lio.error",
+                                   "lio (yaw + t)",
+                                   errors(data_.lio, *T_map_odom),
+                                   "lines lw 1.5 lc rgb '#e8772e'")
+                           : std::string(),
+                curve("fused.error", "fused", errors(data_.fused), "lines lw 2 lc rgb '#17853c'")});
+  }
+
+  const SessionData& data_;
+  Picture picture_;
+  Window span_;
+  std::vector<Window> outages_;
+};
+
+}  // namespace
+
+std::string draw_uncertainty(const SessionData& data, const std::string& gnuplot) {
+  return UncertaintyPicture(data).draw(gnuplot);
+}
+
+}  // namespace trigpoint::evaluation

@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "report_sections.hpp"
+
+#include "table.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+
+namespace trigpoint::evaluation {
+
+namespace {
+
+namespace file = exporter::session_file;
+
+constexpr double kDegrees = 180.0 / std::numbers::pi;
+/// A silence of the gate longer than this is nobody's choice.
+constexpr double kLongestRow_s = 2.0;
+
+std::string sigma_text(double yaw_sigma_rad, const std::array<double, 3>& sigma_m) {
+  return "yaw " + fixed(yaw_sigma_rad * kDegrees, 3) + " deg, east " + fixed(sigma_m[0], 3) +
+         " m, north " + fixed(sigma_m[1], 3) + " m, up " + fixed(sigma_m[2], 3) + " m";
+}
+
+std::string transform_text(const YawPose& T) {
+  return "yaw " + fixed(T.yaw_rad * kDegrees, 4) + " deg, translation (" + fixed(T.p.x(), 3) +
+         ", " + fixed(T.p.y(), 3) + ", " + fixed(T.p.z(), 3) + ") m";
+}
+
+/// Nearest rank: the smallest value that at least this share of the sorted values does not exceed.
+double percentile(const std::vector<double>& sorted, double part) {
+  if (sorted.empty()) {
+    return kNaN;
+  }
+  const auto rank = static_cast<std::size_t>(std::ceil(part * static_cast<double>(sorted.size())));
+  return sorted[std::max<std::size_t>(rank, 1) - 1];
+}
+
+/// Seconds of each source on one axis.
+std::array<double, 4> seconds_by_source(const std::vector<FusionStatus>& rows, std::size_t axis) {
+  std::array<double, 4> seconds{};
+  for (std::size_t i = 0; i + 1 < rows.size(); ++i) {
+    const double dt_s = to_seconds(rows[i + 1].stamp_ns - rows[i].stamp_ns);
+    seconds.at(static_cast<std::size_t>(rows[i].axes.at(axis).source)) +=
+        std::clamp(dt_s, 0.0, kLongestRow_s);
+  }
+  return seconds;
+}
+
+std::string axis_table(const SessionData& data) {
+  Table table({"axis", "threshold m", "fused", "lio", "gps", "none"});
+  const std::array<const char*, 3> names{"east", "north", "up"};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto seconds = seconds_by_source(data.gate, axis);
+    const double all = seconds[0] + seconds[1] + seconds[2] + seconds[3];
+    const auto part = [&](AxisSource source) {
+      return share(seconds.at(static_cast<std::size_t>(source)) / all);
+    };
+    table.add({names.at(axis),
+               fixed(data.gate.back().axes.at(axis).threshold_m, 2),
+               part(AxisSource::kFused),
+               part(AxisSource::kLio),
+               part(AxisSource::kGps),
+               part(AxisSource::kNone)});
+  }
+  return table.str();
+}
+
+/// The number after "POINTS" in a PCD's header.
+std::string points_of(const std::string& pcd) {
+  std::ifstream in(pcd, std::ios::binary);
+  for (std::string word; in >> word && word != "DATA";) {
+    if (word == "POINTS") {
+      std::uint64_t points = 0;
+      in >> points;
+      return std::to_string(points);
+    }
+  }
+  return "an unknown number of";
+}
+
+}  // namespace
+
+std::string print_run(const SessionData& data) {
+  std::string text = "## What was run\n\n";
+  if (data.run) {
+    const auto& run = *data.run;
+    text += "- Log: `" + run.log + "`, " + fixed(run.data_s, 1) +
+            " s\n- Run: " + (run.how == "dds" ? "three processes over DDS" : run.how) +
+            ", gate mode `" + run.mode + "`, GPS filter `" + run.gps_filter +
+            "`\n- Processing time: " + fixed(run.wall_s, 1) + " s, " +
+            fixed(run.data_s / run.wall_s, 2) + " times real time\n";
+  }
+  if (std::filesystem::exists(data.path(file::kConfig))) {
+    text +=
+        std::string("- Effective configuration: [") + file::kConfig + "](" + file::kConfig + ")\n";
+  }
+  if (data.datum) {
+    text += "- Datum (latitude, longitude, ellipsoidal height): " + data.datum->id() +
+            (data.datum->elected_ns == 0
+                 ? ", given by configuration\n"
+                 : ", elected at " + exporter::stamp_text(data.datum->elected_ns) + "\n");
+  }
+  if (!data.lio.empty()) {
+    text += "- Distance driven (lio.tum): " + fixed(length_of(data.lio), 1) + " m\n";
+  }
+  return text;
+}
+
+std::string print_alignment(const SessionData& data) {
+  std::string text = "## Alignment of odom to map\n\n";
+  if (data.alignment) {
+    const auto& [alignment, admitted, comment] = *data.alignment;
+    const auto sigma = [&](int i) { return std::sqrt(alignment.covariance(i, i)); };
+    text += std::string(admitted ? "Admitted" : "**Not admitted by the gate**") +
+            (comment.empty() ? "" : " (" + comment + ")") + ", odom epoch " +
+            std::to_string(alignment.odom_epoch) + ": " + transform_text(alignment.T_map_odom) +
+            ".\n\nIts sigma: " + sigma_text(sigma(0), {sigma(1), sigma(2), sigma(3)}) + ".\n";
+  } else {
+    text += "No alignment was found: nothing in this session is georeferenced by fusion.\n";
+  }
+  const auto last = std::find_if(
+      data.gate.rbegin(), data.gate.rend(), [](const auto& row) { return row.aligned; });
+  if (last != data.gate.rend()) {
+    text += "\nAt the end: " + transform_text(last->T_map_odom) +
+            ". Its sigma: " + sigma_text(last->yaw_sigma_rad, last->position_sigma_m) + ".\n";
+  }
+  return text;
+}
+
+std::string print_gate(const SessionData& data) {
+  std::string text = "## What the gate did\n\n";
+  if (data.gate.empty()) {
+    return text + "No status of the gate was recorded.\n";
+  }
+  const auto& last = data.gate.back();
+  text += "Mode `" + last.mode + "`. Fixes seen " + std::to_string(last.fixes_seen) + ", used " +
+          std::to_string(last.fixes_used) + ".\n\n";
+  Table verdicts({"verdict", "fixes"});
+  for (const auto& [name, count] : last.verdicts) {
+    verdicts.add({name, std::to_string(count)});
+  }
+  if (!verdicts.is_empty()) {
+    text += verdicts.str() + "\n";
+  }
+  return text + "Share of time by source, per axis:\n\n" + axis_table(data);
+}
+
+std::string print_times(const SessionData& data) {
+  std::string text = "## Times per scan\n\n";
+  std::vector<double> times_ms;
+  double sum_ms = 0.0;
+  for (const auto& scan : data.scans) {
+    if (std::isfinite(scan.status.scan_ms)) {
+      times_ms.push_back(scan.status.scan_ms);
+      sum_ms += scan.status.scan_ms;
+    }
+  }
+  if (times_ms.empty()) {
+    return text + "No scan was recorded.\n";
+  }
+  std::sort(times_ms.begin(), times_ms.end());
+  Table table({"scans", "median ms", "p99 ms", "max ms", "mapper alone, times real time"});
+  const double span_s =
+      to_seconds(data.scans.back().status.stamp_ns - data.scans.front().status.stamp_ns);
+  table.add({std::to_string(times_ms.size()),
+             fixed(percentile(times_ms, 0.5), 2),
+             fixed(percentile(times_ms, 0.99), 2),
+             fixed(times_ms.back(), 2),
+             fixed(span_s / (sum_ms * 1e-3), 1)});
+  return text + table.str();
+}
+
+std::string print_map(const SessionData& data) {
+  std::string text = "## Map\n\n";
+  const auto map = data.path(file::kMap);
+  std::error_code error;
+  const auto bytes = std::filesystem::file_size(map, error);
+  if (error) {
+    return text + "There is no " + std::string(file::kMap) + ".\n";
+  }
+  return text + "[" + file::kMap + "](" + file::kMap + "): " + points_of(map) + " points, " +
+         fixed(static_cast<double>(bytes) * 1e-6, 1) + " MB. " +
+         (data.alignment ? "Placed with the alignment above"
+                         : "Without an alignment, so its frame is odom") +
+         ".\n";
+}
+
+}  // namespace trigpoint::evaluation

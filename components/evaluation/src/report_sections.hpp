@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// The parts of report.md, each as Markdown from "##" on.
+#pragma once
+
+#include "session_data.hpp"
+
+#include <string>
+
+namespace trigpoint::evaluation {
+
+std::string print_run(const SessionData& data);
+std::string print_alignment(const SessionData& data);
+std::string print_gate(const SessionData& data);
+std::string print_times(const SessionData& data);
+std::string print_map(const SessionData& data);
+
+/// What became of every message, ending in a sentence that says that all was used, or what was not.
+std::string print_accounting(const SessionData& data);
+
+}  // namespace trigpoint::evaluation

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#pragma once
+
+#include "trigpoint/evaluation/continuity.hpp"
+#include "trigpoint/evaluation/report.hpp"
+#include "trigpoint/export/session.hpp"
+
+#include <Eigen/Core>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace trigpoint::evaluation {
+
+struct ProgramCounts {
+  std::string program;
+  std::vector<NamedCount> counts;
+};
+
+/// Everything that a session folder holds; what is missing is empty, what is damaged is a problem.
+struct SessionData {
+  std::string folder;
+  std::vector<std::string> problems;
+  std::optional<exporter::RunInfo> run;
+  std::optional<Datum> datum;
+  std::optional<exporter::AlignmentRecord> alignment;
+  Trajectory fused;
+  Trajectory fused_smoothed;
+  Trajectory lio;
+  Trajectory gps;
+  Trajectory truth;
+  std::vector<exporter::LoggedFix> fixes;
+  std::vector<FusionStatus> gate;
+  std::vector<GpsStatus> gps_status;
+  std::vector<exporter::LoggedScan> scans;
+  std::vector<ProgramCounts> counts;
+  Eigen::Vector3d antenna_position_base_m{Eigen::Vector3d::Zero()};
+
+  /// Stamps of the fixes that took part: accepted by the GPS filter, else used by the gate, else
+  /// fed at all. In order of time.
+  std::vector<Nanoseconds> accepted_fixes_ns() const;
+
+  /// Gaps between accepted fixes: above 2 s, and above 2.5 times the usual interval.
+  std::vector<Window> outages() const;
+
+  /// First and last stamp of anything; zero without anything.
+  Window span() const;
+
+  std::string path(const std::string& name) const { return exporter::path_in(folder, name); }
+};
+
+SessionData load_session(const std::string& folder, const ReportOptions& options);
+
+}  // namespace trigpoint::evaluation
