@@ -23,7 +23,8 @@ using namespace std::chrono_literals;
 
 constexpr Nanoseconds kClockPeriod_ns = 10'000'000;
 /// A reader's history holds a thousand samples: ask well before that whether all have come.
-constexpr std::uint64_t kImuBurst = 200;
+constexpr std::uint64_t kImuBurst = 400;
+constexpr std::chrono::milliseconds kVerdictGrace{20};
 
 class Player {
  public:
@@ -105,34 +106,33 @@ class Player {
       await("a sweep", lio_status_.matched(), [this] {
         return pace_.wait_for_sweeps(result.sweeps, options_.patience);
       });
+      imu_burst_ = 0;
     }
     points_.publish(bus::to_message(cloud));
-    if (options_.rate == 0.0) {
-      points_.wait_for_acknowledgments(options_.patience);
-    }
     ++result.sweeps;
   }
 
   void send(const ImuSample& sample) {
     imu_.publish(bus::to_message(sample));
-    if (++result.imu % kImuBurst == 0) {
+    ++result.imu;
+    if (++imu_burst_ == kImuBurst) {
+      imu_burst_ = 0;
       imu_.wait_for_acknowledgments(options_.patience);
     }
   }
 
   void send(const GnssFix& fix) {
-    if (options_.rate == 0.0) {
-      imu_.wait_for_acknowledgments(options_.patience);
-    }
     fixes_.publish(bus::to_message(fix));
     ++result.fixes;
     if (options_.rate == 0.0) {
       await("a fix", gps_status_.matched(), [this] {
         return pace_.wait_for_fixes(result.fixes, options_.patience);
       });
-      await("a verdict", fusion_status_.matched(), [&] {
-        return pace_.wait_for_verdict(fix.stamp_ns, options_.patience);
-      });
+      // The verdict of a fix that is newer than the newest sweep comes only after the next one.
+      if (fusion_status_.matched() > 0) {
+        pace_.wait_for_verdict(fix.stamp_ns, kVerdictGrace);
+      }
+      imu_burst_ = 0;
     }
   }
 
@@ -175,6 +175,7 @@ class Player {
 
   const PlayOptions& options_;
   Pace pace_;
+  std::uint64_t imu_burst_{0};
   Nanoseconds first_ns_{0};
   Nanoseconds clock_ns_{0};
   WallClock::time_point started_;

@@ -19,7 +19,8 @@ struct PlayOptions {
   RobotConfig robot;
   bus::Config bus;
   /// Data seconds per wall second; 0: as fast as the mapper and the filter take it, so that nothing
-  /// is dropped: one sweep at a time, and no further than a fix before its verdict.
+  /// is dropped: the next sweep waits until the mapper has done the last one, and after a fix the
+  /// GPS filter's answer is awaited.
   double rate{0.0};
   /// Waits this long for a mapper, a filter and a gate before the first message.
   std::chrono::seconds wait_for_peers{10};

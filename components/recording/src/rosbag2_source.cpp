@@ -142,13 +142,14 @@ class Db3 {
     auto rows =
         database_->prepare("SELECT topic_id, timestamp FROM messages NOT INDEXED ORDER BY id");
     while (rows.step()) {
+      const auto topic = topics_.find(rows.integer(0));
+      if (topic == topics_.end()) {
+        continue;  // where a file is cut off SQLite may hand out a row of zeros
+      }
       const Nanoseconds time_ns = rows.integer(1);
       first_ns_ = first_ns_ == 0 ? time_ns : std::min(first_ns_, time_ns);
       last_ns_ = std::max(last_ns_, time_ns);
-      const auto topic = topics_.find(rows.integer(0));
-      if (topic != topics_.end()) {
-        ++topic->second.messages;
-      }
+      ++topic->second.messages;
     }
   }
 

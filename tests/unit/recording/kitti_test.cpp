@@ -180,7 +180,7 @@ TEST_F(RealKitti, has_51_sweeps_with_times_within_each) {
   EXPECT_EQ(51, sweeps);
 }
 
-TEST_F(RealKitti, arrives_in_order_with_imu_at_100_hz_and_fixes_at_10_hz) {
+TEST_F(RealKitti, arrives_in_order_with_imu_at_100_hz_and_a_fix_a_sweep) {
   const auto entries = read_all(*open_log(kPath, RobotConfig{}));
   EXPECT_TRUE(
       std::is_sorted(entries.begin(), entries.end(), [](const LogEntry& a, const LogEntry& b) {
@@ -193,10 +193,8 @@ TEST_F(RealKitti, arrives_in_order_with_imu_at_100_hz_and_fixes_at_10_hz) {
       100.0,
       static_cast<double>(imu.size() - 1) / to_seconds(imu.back().stamp_ns - imu.front().stamp_ns),
       1.0);
-  EXPECT_NEAR(10.0,
-              static_cast<double>(fixes.size() - 1) /
-                  to_seconds(fixes.back().stamp_ns - fixes.front().stamp_ns),
-              0.2);
+  EXPECT_NEAR(static_cast<double>(clouds.size()), static_cast<double>(fixes.size()), 3.0)
+      << "KITTI keeps one OXTS record a sweep, at 9.7 Hz";
   EXPECT_LT(imu.front().stamp_ns, clouds.front().stamp_ns)
       << "filters start before the first sweep";
   EXPECT_GT(imu.back().stamp_ns, clouds.back().stamp_ns + 103 * kMillisecond_ns)
