@@ -84,6 +84,7 @@ void DataFile::add(const std::vector<double>& row) {
 Picture::Picture(const std::string& folder, const std::string& name)
     : folder_(folder), name_(name) {
   exporter::create_session_folder(folder);
+  fs::remove(fs::path(folder).parent_path() / (name + ".png"));  // an old one is not a new one
 }
 
 std::string Picture::data(const std::string& name, const DataFile& data) const {
@@ -100,7 +101,6 @@ std::string Picture::draw(const std::string& gnuplot,
                           int height_px,
                           const std::string& body) const {
   const auto png = fs::path(folder_).parent_path() / (name_ + ".png");
-  fs::remove(png);  // an old picture must not pass for a new one
   const std::string script = name_ + ".gp";
   std::ostringstream text;
   text << "# cd into this folder and run: gnuplot " << script << "\n"

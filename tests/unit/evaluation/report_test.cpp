@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "trigpoint/evaluation/report.hpp"
+
+#include "trigpoint/export/session.hpp"
+
+#include "../export/scratch_folder.hpp"
+#include "made_session.hpp"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <sstream>
+
+namespace trigpoint::evaluation {
+namespace {
+
+using test::make_session;
+using ::testing::AllOf;
+using ::testing::Each;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using trigpoint::test::error_of;
+using trigpoint::test::read_all;
+using trigpoint::test::ScratchFolder;
+using trigpoint::test::write_all;
+
+const ReportOptions kNoPictures{false, "gnuplot", {}};
+
+/// The cells of the first table row below `heading` that begins with the given cells.
+std::vector<std::string> row(const std::string& text,
+                             const std::string& heading,
+                             const std::vector<std::string>& first) {
+  std::istringstream in(text.substr(std::min(text.size(), text.find(heading))));
+  for (std::string line; std::getline(in, line);) {
+    std::vector<std::string> cells;
+    std::istringstream parts(line);
+    for (std::string cell; std::getline(parts, cell, '|');) {
+      const auto from = cell.find_first_not_of(' ');
+      if (from != std::string::npos) {
+        cells.push_back(cell.substr(from, cell.find_last_not_of(' ') - from + 1));
+      }
+    }
+    if (cells.size() >= first.size() && std::equal(first.begin(), first.end(), cells.begin())) {
+      return cells;
+    }
+  }
+  return std::vector<std::string>(12, "no such row");
+}
+
+std::string three_digits(double value) {
+  std::ostringstream text;
+  text.precision(3);
+  text << std::fixed << value;
+  return text.str();
+}
+
+/// Fused is 3 cm off, and in the outage's 199 scans k = 1..199 it is off by 0.4 m * k / 200.
+double fused_rmse_m() {
+  const int poses = test::kScans - 100 + 1;
+  double sum = 0.0;
+  for (int k = 1; k <= 199; ++k) {
+    sum += std::pow(test::kOutageEndError_m * k / 200.0, 2);
+  }
+  sum += (poses - 199) * std::pow(test::kFusedEastError_m, 2);
+  return std::sqrt(sum / poses);
+}
+
+TEST(Report, of_a_made_session_contains_the_errors_it_was_made_with) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  const auto result = write_report(folder.path(), kNoPictures);
+  EXPECT_THAT(result.problems, IsEmpty());
+  EXPECT_TRUE(result.complete);
+  const auto fused = row(result.text, "Against truth.tum", {"fused.tum", "none"});
+  EXPECT_EQ(fused[2], three_digits(fused_rmse_m()));
+  EXPECT_EQ(fused[6], three_digits(fused_rmse_m()));  // all of it is east
+  EXPECT_EQ(fused[7], "0.000");
+  EXPECT_EQ(fused[9], "1101");
+  EXPECT_EQ(fused[10], "100.0 %");
+  EXPECT_EQ(fused[11], "91.7 %");  // of 2401 truth poses the 2203 from 9.9 s on
+  EXPECT_THAT(read_all(result.report_file), HasSubstr(result.text));
+}
+
+TEST(Report, tells_gps_good_and_the_outage_apart) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  const auto text = write_report(folder.path(), kNoPictures).text;
+  const auto good = row(text, "With GPS and in its outages", {"fused.tum", "GPS good"});
+  EXPECT_EQ(good[2], three_digits(test::kFusedEastError_m));
+  const auto outage =
+      row(text, "With GPS and in its outages", {"fused.tum", "outage from 1700000060.000000000"});
+  EXPECT_EQ(outage[2], "20.0");
+  EXPECT_EQ(outage[5], three_digits(test::kOutageEndError_m * 199.0 / 200.0));
+}
+
+TEST(Report, scores_lio_aligned_since_it_lives_in_odom) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  const auto text = write_report(folder.path(), kNoPictures).text;
+  const auto aligned = row(text, "Against truth.tum", {"lio.tum", "yaw + translation"});
+  EXPECT_EQ(aligned[6], "0.000");
+  // z drifts by 1.2 m linearly; after the mean is taken off its rms is 1.2 / sqrt(12).
+  EXPECT_NEAR(std::stod(aligned[8]), 1.2 / std::sqrt(12.0), 0.001);
+}
+
+TEST(Report, scores_the_antenna_against_withheld_fixes_with_the_lever_arm) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  const auto text = write_report(folder.path(), kNoPictures).text;
+  const auto fused = row(text, "Against withheld fixes", {"fused.tum", "none"});
+  // Withheld fixes lie outside the outage, where fused is 3 cm off.
+  EXPECT_EQ(fused[2], three_digits(test::kFusedEastError_m));
+  ReportOptions no_lever = kNoPictures;
+  no_lever.antenna_position_base_m = Eigen::Vector3d::Zero();
+  const auto without = row(
+      write_report(folder.path(), no_lever).text, "Against withheld fixes", {"fused.tum", "none"});
+  EXPECT_NEAR(std::stod(without[2]), std::hypot(0.5, 0.2, 1.5), 0.04);
+}
+
+TEST(Report, says_that_scoring_on_the_fixes_that_were_used_is_circular) {
+  const ScratchFolder folder;
+  make_session(folder.path(), false);
+  auto fixes = read_all(folder.file("fixes.csv"));
+  for (auto at = fixes.find(",1\n"); at != std::string::npos; at = fixes.find(",1\n")) {
+    fixes.replace(at, 3, ",0\n");
+  }
+  write_all(folder.file("fixes.csv"), fixes);
+  const auto text = write_report(folder.path(), kNoPictures).text;
+  EXPECT_THAT(text, HasSubstr("all fixes (circular)"));
+  EXPECT_THAT(text, Not(HasSubstr("Against truth")));
+}
+
+TEST(Report, tells_scan_times_by_nearest_rank) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  const auto times = row(write_report(folder.path(), kNoPictures).text, "## Times", {"1201"});
+  EXPECT_EQ(times[1], "50.00");
+  EXPECT_EQ(times[2], "99.00");
+  EXPECT_EQ(times[3], "100.00");
+}
+
+TEST(Report, tells_the_gates_shares_of_time_per_axis) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  const auto text = write_report(folder.path(), kNoPictures).text;
+  // East: sigma 0.05 + 0.6 (t - 60) is above 0.5 from 60.8 (first row) to 80: 19.2 of 120 s.
+  const auto east = row(text, "Share of time", {"east"});
+  EXPECT_EQ(east[3], "16.0 %");
+  EXPECT_EQ(east[5], "8.3 %");  // not aligned for 10 s
+  EXPECT_THAT(text, AllOf(HasSubstr("| stale "), HasSubstr("Fixes seen 81, used 72")));
+}
+
+TEST(Report, prints_the_alignments_sigma_also_when_it_is_not_admitted) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  auto record = exporter::read_alignment(folder.file("alignment.yaml"));
+  record.admitted = false;
+  record.comment = "yaw sigma too large";
+  exporter::write_alignment(folder.file("alignment.yaml"), record);
+  EXPECT_THAT(write_report(folder.path(), kNoPictures).text,
+              AllOf(HasSubstr("Not admitted"),
+                    HasSubstr("yaw sigma too large"),
+                    HasSubstr("yaw 0.115 deg, east 0.050 m, north 0.040 m, up 0.100 m")));
+}
+
+TEST(Report, says_that_all_messages_were_used) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  EXPECT_THAT(write_report(folder.path(), kNoPictures).text, HasSubstr("\nALL USED"));
+}
+
+TEST(Report, names_every_loss_of_messages) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  exporter::CountsWriter(folder.path(), "lio_mapper")
+      .write({{"points.received", 1199},
+              {"points.used", 1195},
+              {"points.refused.no_imu", 3},
+              {"imu.received", 24000}});
+  EXPECT_THAT(write_report(folder.path(), kNoPictures).text,
+              AllOf(HasSubstr("NOT ALL USED"),
+                    HasSubstr("lio_mapper received 1199 of 1201 points messages"),
+                    HasSubstr("lio_mapper used 1195 of 1199 points messages (refused: no_imu 3), "
+                              "1 without a counted reason")));
+}
+
+TEST(Report, goes_on_with_the_rest_when_a_file_is_damaged_or_missing) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  write_all(folder.file("gate.csv"), "nonsense\n");
+  std::filesystem::remove(folder.file("gps.tum"));
+  const auto result = write_report(folder.path(), kNoPictures);
+  EXPECT_FALSE(result.complete);
+  EXPECT_THAT(result.problems,
+              testing::UnorderedElementsAre(HasSubstr("gate.csv:1"), HasSubstr("no gps.tum")));
+  EXPECT_THAT(result.text, AllOf(HasSubstr("gate.csv:1"), HasSubstr("| fused.tum")));
+}
+
+TEST(Report, of_a_session_without_anything_is_written_and_incomplete) {
+  const ScratchFolder folder;
+  const auto result = write_report(folder.path());
+  EXPECT_FALSE(result.complete);
+  EXPECT_TRUE(std::filesystem::exists(result.report_file));
+  EXPECT_THAT(result.text, HasSubstr("nothing to measure against"));
+  EXPECT_THAT(error_of([] { write_report("/nowhere"); }), HasSubstr("/nowhere"));
+}
+
+TEST(Report, is_written_without_pictures_when_gnuplot_is_missing) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  ReportOptions options;
+  options.gnuplot = "gnuplot-that-does-not-exist";
+  const auto result = write_report(folder.path(), options);
+  EXPECT_THAT(result.pictures, IsEmpty());
+  EXPECT_THAT(result.problems, Each(HasSubstr("gnuplot-nox")));
+  EXPECT_FALSE(result.complete);
+  EXPECT_THAT(read_all(result.report_file), HasSubstr("| fused.tum"));
+}
+
+class Pictures : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (std::system("gnuplot --version > /dev/null 2>&1") != 0) {
+      GTEST_SKIP() << "gnuplot is not installed: pictures are not tested";
+    }
+  }
+};
+
+/// Width and height of a PNG (big-endian words of its first chunk).
+std::pair<unsigned, unsigned> png_size(const std::string& file) {
+  const auto bytes = read_all(file);
+  if (bytes.size() < 24 || bytes.substr(0, 8) != "\x89PNG\r\n\x1a\n") {
+    return {0, 0};
+  }
+  const auto word = [&](std::size_t at) {
+    unsigned value = 0;
+    for (std::size_t i = at; i < at + 4; ++i) {
+      value = value << 8U | static_cast<unsigned char>(bytes[i]);
+    }
+    return value;
+  };
+  return {word(16), word(20)};
+}
+
+TEST_F(Pictures, are_pngs_of_a_sensible_size_with_their_scripts_beside) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  const auto result = write_report(folder.path());
+  EXPECT_THAT(result.problems, IsEmpty());
+  ASSERT_EQ(result.pictures.size(), 3U);
+  for (const auto& picture : result.pictures) {
+    const auto [width, height] = png_size(picture);
+    EXPECT_EQ(width, 1300U) << picture;
+    EXPECT_GE(height, 400U) << picture;
+    EXPECT_GT(std::filesystem::file_size(picture), 10'000U) << picture;
+  }
+  EXPECT_THAT(read_all(folder.file("report.md")), HasSubstr("![trajectories.png]"));
+  EXPECT_TRUE(std::filesystem::exists(folder.file("plots/uncertainty.gp")));
+  EXPECT_FALSE(std::filesystem::exists(folder.file("plots/uncertainty.log")));  // no complaints
+}
+
+TEST_F(Pictures, are_drawn_anew_by_their_scripts) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  write_report(folder.path());
+  const auto before = read_all(folder.file("trajectories.png"));
+  std::filesystem::remove(folder.file("trajectories.png"));
+  const auto command = "cd '" + folder.path() + "/plots' && gnuplot trajectories.gp";
+  ASSERT_EQ(std::system(command.c_str()), 0);
+  EXPECT_EQ(before, read_all(folder.file("trajectories.png")));
+}
+
+TEST_F(Pictures, of_a_session_without_truth_map_and_datum_are_still_drawn) {
+  const ScratchFolder folder;
+  make_session(folder.path(), false);
+  std::filesystem::remove(folder.file("map.pcd"));
+  std::filesystem::remove(folder.file("datum.yaml"));
+  std::filesystem::remove(folder.file("gps_status.csv"));
+  EXPECT_EQ(write_report(folder.path()).pictures.size(), 3U);
+}
+
+TEST_F(Pictures, that_cannot_be_drawn_are_told_and_an_old_one_is_not_left) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  write_report(folder.path());
+  std::filesystem::remove(folder.file("scans.csv"));
+  const auto result = write_report(folder.path());
+  EXPECT_THAT(result.problems, testing::Contains(HasSubstr("no scan to draw")));
+  EXPECT_FALSE(std::filesystem::exists(folder.file("scan_times.png")));
+}
+
+}  // namespace
+}  // namespace trigpoint::evaluation
