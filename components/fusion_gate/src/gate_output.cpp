@@ -139,6 +139,9 @@ FusionStatus FusionGate::Impl::status() const {
 
 void FusionGate::Impl::finish(Output& out, bool status_wanted) {
   follow_healthiest(out);
+  if (now_ns == 0) {
+    return;  // no data time yet: raw fixes alone do not set it
+  }
   const bool due =
       !last_status_ns || to_seconds(now_ns - *last_status_ns) >= config.status_period_s;
   if (status_wanted || verdict_changed || due) {

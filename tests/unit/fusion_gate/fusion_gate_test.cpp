@@ -205,6 +205,36 @@ TEST(FusionGate, judges_a_repeated_status_once) {
   EXPECT_EQ(drive.record().updates.size(), before + 1);
 }
 
+TEST(FusionGate, judges_a_fix_once_when_statuses_come_shuffled) {
+  SimulatedDrive drive{Scenario{}};
+  drive.run_until(20.0);
+  const std::size_t before = drive.record().updates.size();
+  const GpsStatus older = drive.status(20.0);
+  const GpsStatus newer = drive.status(20.2);
+  for (const GpsStatus& status : {newer, older, newer, older}) {
+    drive.keep(drive.gate().on_gps_status(status, "gps-a"));
+  }
+  EXPECT_EQ(drive.record().updates.size(), before + 2);
+}
+
+TEST(FusionGate, mixes_no_pairs_of_two_odom_epochs) {
+  Scenario scenario;
+  scenario.with_mapper = false;
+  SimulatedDrive drive{scenario};
+  drive.run_until(8.0);
+  const YawPose moved{-1.0, {3.0, 2.0, 1.0}};
+  drive.begin_epoch(moved);
+  drive.run_until(20.0);
+  std::size_t of_new_epoch = 0;
+  for (const StateUpdate& update : drive.record().updates) {
+    if (update.first_alignment->odom_epoch == drive.epoch) {
+      ++of_new_epoch;
+      EXPECT_NEAR(update.first_alignment->T_map_odom.yaw_rad, moved.yaw_rad, 1e-3);
+    }
+  }
+  EXPECT_GT(of_new_epoch, 20U);
+}
+
 TEST(FusionGate, aligns_anew_in_a_new_odom_epoch) {
   Scenario scenario;
   SimulatedDrive drive{scenario};
