@@ -4,8 +4,6 @@
 
 #include "trigpoint/base/config.hpp"
 
-#include <limits>
-
 namespace trigpoint::gps_odometry {
 
 namespace {
@@ -26,10 +24,11 @@ void describe_output(Config& c, ConfigFields& f) {
 }
 
 void describe_datum(Config& c, ConfigFields& f) {
-  f.number("datum_latitude_deg",
-           c.datum_latitude_deg,
-           "Datum; .nan leaves it to the bus, and then to an election");
-  f.number("datum_longitude_deg", c.datum_longitude_deg, "Datum, with latitude and height");
+  f.flag("use_configured_datum",
+         c.use_configured_datum,
+         "Take the datum from here; otherwise from the bus, or else from an election");
+  f.number("datum_latitude_deg", c.datum_latitude_deg, "Datum", {-90.0, 90.0});
+  f.number("datum_longitude_deg", c.datum_longitude_deg, "Datum", {-180.0, 180.0});
   f.number("datum_height_m", c.datum_height_m, "Datum, above the WGS 84 ellipsoid");
   f.number("datum_wait_s",
            c.datum_wait_s,
@@ -120,12 +119,13 @@ void describe_imu(Config& c, ConfigFields& f) {
            kPositive);
   f.number("gyro_bias_horizon_s",
            c.gyro_bias_horizon_s,
-           "Time for which the attitude noise stands in for the missing gyro bias state",
+           "Least time for which the attitude noise stands in for the missing gyro bias state; it "
+           "grows with the age of the last fix",
            kPositive);
   f.number("accel_bias_sigma_mps2", c.accel_bias_sigma_mps2, "Accelerometer bias", kPositive);
   f.number("accel_bias_horizon_s",
            c.accel_bias_horizon_s,
-           "Time for which the velocity noise stands in for the missing accelerometer bias state",
+           "The same, velocity noise and accelerometer bias",
            kPositive);
   f.number("attitude_noise_rad_sqrts",
            c.attitude_noise_rad_sqrts,
@@ -169,11 +169,6 @@ void describe_heading(Config& c, ConfigFields& f) {
 }
 
 }  // namespace
-
-Config::Config()
-    : datum_latitude_deg(std::numeric_limits<double>::quiet_NaN()),
-      datum_longitude_deg(std::numeric_limits<double>::quiet_NaN()),
-      datum_height_m(std::numeric_limits<double>::quiet_NaN()) {}
 
 void describe(Config& config, ConfigFields& fields) {
   describe_output(config, fields);

@@ -27,17 +27,8 @@ constexpr int kSilentImuFixes = 3;
 constexpr double kFrozenSpeed_mps = 0.5;
 
 std::optional<Datum> configured_datum(const Config& config) {
-  const int given = static_cast<int>(!std::isnan(config.datum_latitude_deg)) +
-                    static_cast<int>(!std::isnan(config.datum_longitude_deg)) +
-                    static_cast<int>(!std::isnan(config.datum_height_m));
-  if (given == 0) {
+  if (!config.use_configured_datum) {
     return std::nullopt;
-  }
-  if (given != 3) {
-    throw ConfigError(
-        "gps_odometry: datum_latitude_deg, datum_longitude_deg and datum_height_m belong "
-        "together; " +
-        std::to_string(given) + " of 3 are given.");
   }
   const Datum datum{
       config.datum_latitude_deg, config.datum_longitude_deg, config.datum_height_m, 0};

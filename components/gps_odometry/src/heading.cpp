@@ -18,7 +18,7 @@ using Complex = std::complex<double>;
 // A way whose legs disagree about the heading (reversing, sliding, noise) is not believed.
 constexpr double kLeastAgreement = 0.9;
 // A gyro without bias estimate drifts; older legs say less than they seem to.
-constexpr Nanoseconds kLongestWay_ns = 30 * kNanosecondsPerSecond;
+constexpr Nanoseconds kLongestWay_ns = 60 * kNanosecondsPerSecond;
 // Mounting and slip: course over ground is not heading.
 constexpr double kCourseSigma_rad = 0.035;
 
@@ -47,7 +47,7 @@ std::optional<HeadingEstimate> HeadingSearch::add(const CoursePoint& point, cons
   }
   const CoursePoint last = points_[static_cast<std::size_t>(size_ - 1)];
   const double leg_m = (point.antenna_map_m - last.antenna_map_m).norm();
-  if (leg_m < std::max(0.2 * config.heading_baseline_m, point.sigma_m)) {
+  if (leg_m < std::max(0.2 * config.heading_baseline_m, 2.0 * point.sigma_m)) {
     return std::nullopt;
   }
   keep(point);

@@ -27,6 +27,8 @@ constexpr double kTeleportMargin_m = 5.0;
 constexpr double kAligningSpeedSigma_mps = 1.0;
 constexpr int kRecoveryFixes = 4;
 constexpr double kRecoveryGap_s = 5.0;  // refused fixes further apart are not one streak
+constexpr double kGyroBiasGrowth = 3.3;
+constexpr double kAccelBiasGrowth = 3.0;
 constexpr double kIgnoredHeight_m2 = 1e8;
 
 }  // namespace
@@ -54,14 +56,17 @@ void Tracker::start(Track& track, const CheckedImu& imu) const {
 }
 
 MotionNoise Tracker::noise(const Track& track) const {
-  // The state has no biases. A constant bias b grows an error b t; a random walk with the rate
-  // b^2 T bounds it for all t up to the horizon T.
+  // The state has no biases. Without fixes a constant accelerometer bias b makes the position's
+  // variance b^2 t^4 / 4; a random walk of the velocity with the rate 3 b^2 t makes the same. For a
+  // gyro bias through the tilt, b^2 g^2 t^6 / 36, the rate is 3.3 b^2 t. So the rates grow with the
+  // age of the last fix, from what fixes cannot see on.
+  const double age_s = track.accepted_ns > 0 ? to_seconds(track.stamp_ns - track.accepted_ns) : 0.0;
+  const double gyro_horizon_s = std::max(config_.gyro_bias_horizon_s, kGyroBiasGrowth * age_s);
+  const double accel_horizon_s = std::max(config_.accel_bias_horizon_s, kAccelBiasGrowth * age_s);
   MotionNoise noise;
-  noise.attitude_rad_sqrts =
-      std::hypot(config_.attitude_noise_rad_sqrts,
-                 track.gyro_bias_sigma_radps * std::sqrt(config_.gyro_bias_horizon_s));
-  noise.velocity_mps_sqrts =
-      config_.accel_bias_sigma_mps2 * std::sqrt(config_.accel_bias_horizon_s);
+  noise.attitude_rad_sqrts = std::hypot(config_.attitude_noise_rad_sqrts,
+                                        track.gyro_bias_sigma_radps * std::sqrt(gyro_horizon_s));
+  noise.velocity_mps_sqrts = config_.accel_bias_sigma_mps2 * std::sqrt(accel_horizon_s);
   noise.rate_radps_sqrts = config_.rate_noise_radps_sqrts;
   noise.acceleration_sigma_mps2 = config_.acceleration_sigma_mps2;
   noise.acceleration_tau_s = config_.acceleration_tau_s;

@@ -20,10 +20,11 @@ struct Config {
   double dead_reckoning_after_s{1.0};
   double stale_after_s{30.0};
 
-  // Datum. The three numbers come together or not at all (NaN = not given).
-  double datum_latitude_deg;
-  double datum_longitude_deg;
-  double datum_height_m;
+  // Datum.
+  bool use_configured_datum{false};
+  double datum_latitude_deg{0.0};
+  double datum_longitude_deg{0.0};
+  double datum_height_m{0.0};
   double datum_wait_s{2.0};
   std::int64_t datum_fixes{10};
 
@@ -48,27 +49,25 @@ struct Config {
   double floor_sigma_other_m{0.05};
 
   // IMU and motion model.
-  double gyro_sigma_radps{0.01};
+  double gyro_sigma_radps{0.005};
   double accel_sigma_mps2{0.2};
   double gyro_bias_sigma_radps{0.005};
-  double gyro_bias_rest_sigma_radps{0.0005};
-  double gyro_bias_horizon_s{20.0};
+  double gyro_bias_rest_sigma_radps{0.0003};
+  double gyro_bias_horizon_s{5.0};
   double accel_bias_sigma_mps2{0.05};
-  double accel_bias_horizon_s{10.0};
-  double attitude_noise_rad_sqrts{0.002};
+  double accel_bias_horizon_s{3.0};
+  double attitude_noise_rad_sqrts{0.0005};
   double rate_noise_radps_sqrts{1.0};
   double acceleration_sigma_mps2{1.5};
   double acceleration_tau_s{2.0};
   double longest_step_s{0.02};
 
   // Heading from motion.
-  double heading_sigma_rad{0.1};
+  double heading_sigma_rad{0.15};
   double heading_baseline_m{1.5};
   double heading_speed_mps{0.4};
   double heading_converged_rad{0.17};
   double heading_lost_rad{0.8};
-
-  Config();
 };
 
 void describe(Config& config, ConfigFields& fields);
