@@ -33,8 +33,12 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
   return row[b.size()];
 }
 
-/// Shortest decimal text that reads back as the same double.
+/// Shortest decimal text that reads back as the same double; NaN, the default of what is not known,
+/// is YAML's null.
 std::string shortest_text(double value) {
+  if (std::isnan(value)) {
+    return "~";
+  }
   std::array<char, 40> text{};
   const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
   return {text.data(), end};
@@ -43,7 +47,7 @@ std::string shortest_text(double value) {
 /// The same with a point, so that a whole value still shows that the field takes fractions.
 std::string number_text(double value) {
   const std::string text = shortest_text(value);
-  return text.find_first_of(".en") == std::string::npos ? text + ".0" : text;
+  return text.find_first_of(".en~") == std::string::npos ? text + ".0" : text;
 }
 
 std::string bounds_text(const Bounds& bounds) {
@@ -186,9 +190,15 @@ class Loader final : public ConfigFields {
   }
 
  private:
+  /// Undefined also for null: a key without a value leaves the default.
   YAML::Node find(const std::string& key) {
     known_.insert(key);
-    return node_ && node_.IsMap() ? node_[key] : YAML::Node(YAML::NodeType::Undefined);
+    const YAML::Node undefined(YAML::NodeType::Undefined);
+    if (!node_ || !node_.IsMap()) {
+      return undefined;
+    }
+    const YAML::Node entry = node_[key];
+    return entry && entry.IsNull() ? undefined : entry;
   }
 
   template <typename T>

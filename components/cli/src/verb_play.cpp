@@ -75,10 +75,7 @@ class SessionPart {
                            "ekf15",
                            to_seconds(part_->last_ns() - part_->first_ns()),
                            wall_s});
-      const auto truth = reader.truth_file();
-      if (truth && *truth != exporter::path_in(folder_, file::kTruth)) {
-        exporter::copy_file(*truth, exporter::path_in(folder_, file::kTruth));
-      }
+      part_->keep_truth(reader);
     });
   }
 

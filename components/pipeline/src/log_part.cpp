@@ -10,7 +10,7 @@ namespace file = exporter::session_file;
 using exporter::path_in;
 
 LogPart::LogPart(const std::string& session)
-    : fixes_(path_in(session, file::kFixes)), counts_(session, "log") {}
+    : session_(session), fixes_(path_in(session, file::kFixes)), counts_(session, "log") {}
 
 void LogPart::on_entry(const recording::LogEntry& entry) {
   if (first_ns_ == 0) {
@@ -35,6 +35,14 @@ void LogPart::close() {
                  {"fix.in_log", fixes_fed_ + fixes_withheld_},
                  {"fix.withheld", fixes_withheld_},
                  {"fix.published", fixes_fed_}});
+}
+
+void LogPart::keep_truth(const recording::LogReader& log) const {
+  const std::string kept = path_in(session_, file::kTruth);
+  const auto truth = log.truth_file();
+  if (truth && *truth != kept) {
+    exporter::copy_file(*truth, kept);
+  }
 }
 
 }  // namespace trigpoint::pipeline

@@ -131,9 +131,7 @@ MapLogResult map_log(recording::LogReader& log,
   exporter::write_run(
       session.path(file::kRun),
       {log.summary().path, "offline", options.mode, "ekf15", result.data_s, result.wall_s});
-  if (const auto truth = log.truth_file()) {
-    exporter::copy_file(*truth, session.path(file::kTruth));
-  }
+  session.log().keep_truth(log);
   return result;
 }
 

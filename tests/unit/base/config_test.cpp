@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <limits>
 
 namespace trigpoint {
 namespace {
@@ -110,6 +111,16 @@ TEST(Config, the_print_reads_back_as_the_same_values) {
   EXPECT_EQ(read.mode, changed.mode);
   EXPECT_EQ(read.arm_m, changed.arm_m);
   EXPECT_EQ(read.topics, changed.topics);
+}
+
+TEST(Config, what_is_not_known_prints_as_null_and_null_leaves_the_default) {
+  Sample unknown;
+  unknown.gain = std::numeric_limits<double>::quiet_NaN();
+  const std::string print = print_config(document(unknown));
+  EXPECT_THAT(print, HasSubstr("gain: ~"));
+  Sample read;
+  load_config_text(print, "print", document(read));
+  EXPECT_EQ(read.gain, Sample().gain);
 }
 
 TEST(Config, a_missing_file_is_named) {

@@ -73,6 +73,8 @@ class LogPart {
   explicit LogPart(const std::string& session);
   void on_entry(const recording::LogEntry& entry);
   void close();
+  /// Copies the truth that lies beside the log, if any; for scoring only.
+  void keep_truth(const recording::LogReader& log) const;
 
   Nanoseconds first_ns() const { return first_ns_; }
 
@@ -81,6 +83,7 @@ class LogPart {
   std::uint64_t sweeps() const { return sweeps_; }
 
  private:
+  std::string session_;
   exporter::FixLog fixes_;
   exporter::CountsWriter counts_;
   Nanoseconds first_ns_{0};
