@@ -20,7 +20,7 @@ struct Config {
       initial_peers;  ///< "10.0.0.2" or "10.0.0.2:7410", for nets without multicast
   std::int64_t socket_buffer_bytes{4'194'304};
   std::int64_t datagram_bytes{65'500};  ///< 1472 between computers: one Ethernet frame each
-  double heartbeat_s{0.1};              ///< how often a reliable writer asks what was lost
+  double heartbeat_s{0.05};             ///< how often a reliable writer asks what was lost
   double lease_s{2.0};                  ///< silence after which a process counts as gone
 };
 

@@ -3,7 +3,7 @@
 // Every topic of Trigpoint: name, type, QoS. The only table; idl/README.md tells it in words.
 // Readers of sensors and odometry are RELIABLE and are made anew as BEST_EFFORT by Subscription
 // when a writer offers only that. Depths: an IMU reader or writer that stalls for a second loses
-// nothing at 1 kHz.
+// nothing at 1 kHz, and one of sweeps may stall for four seconds at 10 Hz.
 #pragma once
 
 #include "trigpoint/bus/qos.hpp"
@@ -18,7 +18,9 @@
 namespace trigpoint::bus::topics {
 
 // The three sensor topics have the names of RobotConfig: `points.renamed(robot.points_topic)`.
-inline constexpr Topic<sensor_msgs::msg::PointCloud2> points{"points", qos::kDefault.as_bulk()};
+inline constexpr Topic<sensor_msgs::msg::PointCloud2> points{
+    "points",
+    qos::kDefault.with_depth(40).as_bulk()};
 inline constexpr Topic<sensor_msgs::msg::Imu> imu{"imu/data", qos::kDefault.with_depth(1000)};
 inline constexpr Topic<sensor_msgs::msg::NavSatFix> fix{"gps/fix", qos::kDefault.with_depth(100)};
 
