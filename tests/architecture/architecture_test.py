@@ -27,6 +27,18 @@ MACHINE_PATH = re.compile(r"(?<![\w.$}{/-])/(work|root)/[\w.]")
 SPDX = "SPDX-License-Identifier: Apache-2.0"
 
 
+def tracked_paths(root):
+    """What git tracks, or in an unpacked archive what is there, without folders that a build makes."""
+    listed = subprocess.run(["git", "-C", root, "ls-files", "-z"], capture_output=True, check=False)
+    if listed.returncode == 0:
+        return list(filter(None, listed.stdout.decode().split("\0")))
+    paths = []
+    for folder, subfolders, names in os.walk(root):
+        subfolders[:] = [name for name in subfolders if name not in ("build", "install", "sessions", ".git")]
+        paths += [os.path.relpath(os.path.join(folder, name), root) for name in names]
+    return paths
+
+
 class Tree:
     """Tracked files by path, and the order of the components."""
 
@@ -35,9 +47,8 @@ class Tree:
 
     @classmethod
     def of_repository(cls, root):
-        listed = subprocess.run(["git", "-C", root, "ls-files", "-z"], capture_output=True, check=True).stdout
         files = {}
-        for path in filter(None, listed.decode().split("\0")):
+        for path in tracked_paths(root):
             full = os.path.join(root, path)
             if os.path.isfile(full):
                 with open(full, encoding="utf-8", errors="replace") as file:
