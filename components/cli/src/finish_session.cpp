@@ -2,6 +2,7 @@
 // Copyright the Trigpoint developers
 #include "finish_session.hpp"
 
+#include "trigpoint/evaluation/report.hpp"
 #include "trigpoint/export/map.hpp"
 #include "trigpoint/export/session.hpp"
 
@@ -50,7 +51,15 @@ void render_map(const std::string& session) {
 
 int finish_session(const std::string& session) {
   render_map(session);
-  return 0;
+  const evaluation::ReportResult report = evaluation::write_report(session);
+  std::cout << report.text << "\n" << report.report_file << "\n";
+  for (const std::string& picture : report.pictures) {
+    std::cout << picture << "\n";
+  }
+  for (const std::string& problem : report.problems) {
+    std::cerr << "trigpoint report: " << problem << "\n";
+  }
+  return report.complete ? 0 : 1;
 }
 
 std::string mode_of(const SystemConfig& config) {

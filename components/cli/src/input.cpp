@@ -15,9 +15,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A folder made by `trigpoint simulate`: log/, truth.tum and robot.yaml.
+/// A folder made by `trigpoint simulate`: log/, truth.tum, scenario.yaml.
 bool is_simulated_drive(const fs::path& folder) {
-  return fs::is_directory(folder / "log") && fs::is_regular_file(folder / "robot.yaml");
+  return fs::is_directory(folder / "log") && fs::is_regular_file(folder / "scenario.yaml");
 }
 
 /// Hands everything on and knows where the truth of a simulated drive lies.
@@ -41,17 +41,26 @@ class WithTruth final : public recording::LogReader {
   std::string truth_;
 };
 
-/// Defaults, then what the log knows of its robot, then the user's files.
-SystemConfig configure(const InputOptions& options,
-                       const std::optional<RobotConfig>& robot,
-                       const std::vector<std::string>& overlays) {
+/// What a log knows by itself.
+struct Known {
+  std::optional<RobotConfig> robot;
+  std::optional<Datum> datum;  ///< the surveyed origin of a simulated world
+};
+
+/// Defaults, then what the log knows, then the user's files.
+SystemConfig configure(const InputOptions& options, const Known& known) {
   SystemConfig config;
-  if (robot) {
-    config.cores.robot = *robot;
+  if (known.robot) {
+    config.cores.robot = *known.robot;
   }
-  std::vector<std::string> files = overlays;
-  files.insert(files.end(), options.config_files.begin(), options.config_files.end());
-  load(config, files);
+  if (known.datum) {
+    gps_odometry::Config& gps = config.cores.gps_odometry;
+    gps.use_configured_datum = true;
+    gps.datum_latitude_deg = known.datum->latitude_deg;
+    gps.datum_longitude_deg = known.datum->longitude_deg;
+    gps.datum_height_m = known.datum->height_m;
+  }
+  load(config, options.config_files);
   if (!options.mode.empty()) {
     load_config_text("fusion_gate: {mode: " + options.mode + "}",
                      "--mode",
@@ -78,27 +87,44 @@ Input open_scenario(const InputOptions& options, const std::string& truth_file) 
     reader->write_truth(truth_file);
   }
   Input input;
-  input.config = configure(options, reader->robot(), {});
+  input.config = configure(options, {reader->robot(), scenario.datum});
   input.reader = std::move(reader);
   return input;
 }
 
-Input open_recording(const InputOptions& options) {
-  const fs::path path(options.log);
-  const bool simulated = is_simulated_drive(path);
-  const std::vector<std::string> overlays =
-      simulated ? std::vector<std::string>{(path / "robot.yaml").string()}
-                : std::vector<std::string>{};
-  const std::string log = simulated ? (path / "log").string() : options.log;
-  Input input;
-  input.config = configure(options, std::nullopt, overlays);
-  input.reader = recording::open_log(log, input.config.cores.robot, input.config.log);
-  if (const auto robot = input.reader->robot()) {
-    input.config = configure(options, robot, overlays);
+/// The folder made by `trigpoint simulate` that `path` is or lies in (as its log/), if so.
+std::optional<fs::path> simulated_drive_of(const fs::path& path) {
+  for (const fs::path& folder : {path, fs::absolute(path).lexically_normal().parent_path()}) {
+    if (is_simulated_drive(folder)) {
+      return folder;
+    }
   }
-  if (simulated && fs::is_regular_file(path / "truth.tum")) {
-    input.reader =
-        std::make_unique<WithTruth>(std::move(input.reader), (path / "truth.tum").string());
+  return std::nullopt;
+}
+
+Input open_simulated_drive(const InputOptions& options, const fs::path& folder) {
+  const simulator::Scenario scenario =
+      simulator::load_scenario((folder / "scenario.yaml").string());
+  Input input;
+  input.config = configure(options, {scenario.robot, scenario.datum});
+  input.reader =
+      recording::open_log((folder / "log").string(), input.config.cores.robot, input.config.log);
+  const fs::path truth = folder / "truth.tum";
+  if (fs::is_regular_file(truth)) {
+    input.reader = std::make_unique<WithTruth>(std::move(input.reader), truth.string());
+  }
+  return input;
+}
+
+Input open_recording(const InputOptions& options) {
+  if (const auto folder = simulated_drive_of(options.log)) {
+    return open_simulated_drive(options, *folder);
+  }
+  Input input;
+  input.config = configure(options, {});
+  input.reader = recording::open_log(options.log, input.config.cores.robot, input.config.log);
+  if (const auto robot = input.reader->robot()) {
+    input.config = configure(options, {robot, std::nullopt});
   }
   return input;
 }
@@ -132,7 +158,7 @@ Input open_input(const InputOptions& options, const std::string& truth_file) {
 }
 
 SystemConfig load_config_of(const InputOptions& options) {
-  return configure(options, std::nullopt, {});
+  return configure(options, {});
 }
 
 }  // namespace trigpoint::cli
