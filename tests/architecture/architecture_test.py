@@ -117,6 +117,8 @@ def arrows_point_one_way(tree):
     order = {name: rank for rank, name in enumerate(tree.order())}
     found = []
     for path, text in tree.sources("components/"):
+        if "/process/" in path:
+            continue  # a program's shell, built in components/processes: nothing depends on it
         own = component_of(path)
         for header in includes(text):
             other = included_component(header)
