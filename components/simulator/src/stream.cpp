@@ -13,8 +13,9 @@
 #include "town.hpp"
 #include "world.hpp"
 
+#include <algorithm>
+#include <limits>
 #include <optional>
-#include <queue>
 #include <vector>
 
 namespace trigpoint::simulator {
@@ -53,7 +54,7 @@ struct Pending {
   LogEntry entry;
   std::uint64_t order{0};
 
-  bool operator<(const Pending& other) const {  // the earliest on top of a std::priority_queue
+  bool operator<(const Pending& other) const {  // the earliest in front of a heap
     return entry.receive_ns != other.entry.receive_ns ? entry.receive_ns > other.entry.receive_ns
                                                       : order > other.order;
   }
@@ -117,9 +118,9 @@ class Stream final : public ScenarioReader {
       newest_ns_ = drive_->last_ns();
       return std::nullopt;
     }
-    // priority_queue has no way to move its top out; the order does not depend on the payload.
-    LogEntry entry = std::move(const_cast<Pending&>(pending_.top()).entry);
-    pending_.pop();
+    std::pop_heap(pending_.begin(), pending_.end());
+    LogEntry entry = std::move(pending_.back().entry);
+    pending_.pop_back();
     newest_ns_ = entry.receive_ns;
     return entry;
   }
@@ -138,7 +139,7 @@ class Stream final : public ScenarioReader {
         fix_epochs_, std::max(0.0, scenario_.gnss.latency_s - scenario_.gnss.latency_jitter_s));
     const Nanoseconds sweep_ns = arrival(sweep_epochs_, sweep_delay_s());
     const Nanoseconds first_ns = std::min({imu_ns, fix_ns, sweep_ns});
-    if (first_ns == kNever || (!pending_.empty() && pending_.top().entry.receive_ns < first_ns)) {
+    if (first_ns == kNever || (!pending_.empty() && pending_.front().entry.receive_ns < first_ns)) {
       return false;
     }
     if (first_ns == imu_ns) {
@@ -156,7 +157,8 @@ class Stream final : public ScenarioReader {
   }
 
   void push(Nanoseconds receive_ns, recording::Measurement measurement) {
-    pending_.push({LogEntry{receive_ns, std::move(measurement), false}, order_++});
+    pending_.push_back({LogEntry{receive_ns, std::move(measurement), false}, order_++});
+    std::push_heap(pending_.begin(), pending_.end());
   }
 
   void make_imu() {
@@ -246,7 +248,7 @@ class Stream final : public ScenarioReader {
   Epochs imu_epochs_;
   Epochs fix_epochs_;
   Epochs sweep_epochs_;
-  std::priority_queue<Pending> pending_;
+  std::vector<Pending> pending_;  ///< a heap, the earliest in front
   std::uint64_t order_{0};
   Nanoseconds newest_ns_{0};
   recording::LogSummary summary_;
