@@ -122,6 +122,9 @@ class Process {
       publish(scan);
       keep([&] { session_->on_scan(scan); });
     }
+    if (output.scans.empty() && core_.status().scans_received != reported_received_) {
+      publish_status(core_.status());
+    }
     if (output.odometry_imu_rate) {
       imu_rate_.publish(bus::to_message(*output.odometry_imu_rate));
     }
@@ -130,7 +133,7 @@ class Process {
   void publish(const lio_mapper::ScanResult& scan) {
     last_ = scan.status;
     odometry_.publish(bus::to_message(scan.odometry));
-    status_.publish(bus::to_message(scan.status));
+    publish_status(scan.status);
     const bus::StampedTransform transform{scan.odometry.stamp_ns,
                                           scan.odometry.frame_id,
                                           scan.odometry.child_frame_id,
@@ -140,6 +143,12 @@ class Process {
       cloud_.publish(bus::to_message(
           to_cloud_message(scan.points_odom, scan.odometry.stamp_ns, scan.odometry.frame_id)));
     }
+  }
+
+  /// After every sweep, also one that waits or was refused: a player goes by it.
+  void publish_status(const LioStatus& status) {
+    reported_received_ = status.scans_received;
+    status_.publish(bus::to_message(status));
   }
 
   void publish_extrinsics(const RobotConfig& robot) {
@@ -162,7 +171,7 @@ class Process {
   void report_health() {
     const LioStatus status = core_.status();
     if (status.scans_used == reported_scans_) {
-      status_.publish(bus::to_message(status));
+      publish_status(status);
     }
     reported_scans_ = status.scans_used;
     const bus::Diagnostic line{level_of(status.health),
@@ -188,6 +197,7 @@ class Process {
   std::optional<pipeline::MapperPart> session_;
   LioStatus last_;
   std::uint64_t reported_scans_{0};
+  std::uint64_t reported_received_{0};
   bus::Participant participant_;
   bus::Publisher<nav_msgs::msg::Odometry> odometry_;
   bus::Publisher<nav_msgs::msg::Odometry> imu_rate_;

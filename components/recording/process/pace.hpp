@@ -22,6 +22,9 @@ class Pace {
     for (const NamedCount& refused : status.scans_refused) {
       done += refused.count;
     }
+    if (status.health == LioHealth::kInit) {
+      done = status.scans_received;  // it collects sweeps until it knows where odom begins
+    }
     tell([&] {
       sweeps_.heard(done);
       imu_.heard(status.imu_received);
