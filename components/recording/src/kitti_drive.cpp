@@ -90,13 +90,13 @@ FixStatus status_of(double position_mode) {
 }
 
 /// pos_accuracy is the root of the sum of the squares of the north and the east sigma (its square
-/// is a whole number of mm^2, and vel_accuracy is 18 mm/s times the root of 2): taken for each
-/// axis it is careful by that root. The vertical sigma is not recorded; GNSS is commonly half as
+/// is a whole number of mm^2, and vel_accuracy is 18 mm/s times the root of 2): each axis has it
+/// over that root. The vertical sigma is not recorded; GNSS is commonly half as
 /// bad again in height.
 Eigen::Matrix3d covariance_of(double position_accuracy_m) {
   constexpr double kVerticalOverHorizontal = 1.5;
   const Eigen::Vector3d sigma =
-      position_accuracy_m * Eigen::Vector3d(1.0, 1.0, kVerticalOverHorizontal);
+      position_accuracy_m / std::numbers::sqrt2 * Eigen::Vector3d(1.0, 1.0, kVerticalOverHorizontal);
   return sigma.cwiseAbs2().asDiagonal();
 }
 
