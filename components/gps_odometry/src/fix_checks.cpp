@@ -98,6 +98,11 @@ Repair repair_covariance(const GnssFix& fix, const Config& config) {
 }
 
 FixVerdict refuse_message(const GnssFix& fix) {
+  if (!is_usable_stamp(fix.stamp_ns)) {
+    return refuse(
+        "stamp_out_of_range",
+        sentence("Fix refused: its stamp is %g s, expected 0 to 8e9.", to_seconds(fix.stamp_ns)));
+  }
   if (fix.status == FixStatus::kNoFix) {
     return refuse("no_fix", "The receiver says that it has no fix.");
   }
@@ -130,6 +135,10 @@ FixVerdict refuse_message(const GnssFix& fix) {
 }
 
 }  // namespace
+
+bool is_usable_stamp(Nanoseconds stamp_ns) {
+  return stamp_ns >= 0 && stamp_ns < 8'000'000'000 * kNanosecondsPerSecond;
+}
 
 FixVerdict check_fix(const GnssFix& fix, const Config& config) {
   if (FixVerdict refused = refuse_message(fix); !refused.reason.empty()) {

@@ -72,7 +72,6 @@ struct GpsOdometry::Impl {
   void publish_odometry(Output& output);
   Odometry odometry() const;
   GpsStatus status() const;
-  void see(Nanoseconds stamp_ns);
   Surroundings around() const;
 
   Config config;
@@ -93,11 +92,6 @@ struct GpsOdometry::Impl {
   std::optional<Nanoseconds> published_ns;
   std::optional<Nanoseconds> status_ns;
 };
-
-void GpsOdometry::Impl::see(Nanoseconds stamp_ns) {
-  election.begin(stamp_ns);
-  now_ns = std::max(now_ns, stamp_ns);
-}
 
 void GpsOdometry::Impl::refuse(const std::string& reason,
                                const std::string& text,
@@ -127,7 +121,8 @@ void GpsOdometry::Impl::take_imu(const ImuSample& sample, Output& output) {
     status_ns.reset();
   }
   if (verdict.sample) {
-    see(sample.stamp_ns);
+    election.begin(sample.stamp_ns);
+    now_ns = buffer.newest_imu_ns() ? std::max(now_ns, sample.stamp_ns) : sample.stamp_ns;
     fixes_ahead = 0;
     buffer.insert(*verdict.sample);
     publish_odometry(output);
@@ -165,6 +160,12 @@ std::optional<CheckedFix> GpsOdometry::Impl::checked(const GnssFix& message, Out
 
 bool GpsOdometry::Impl::is_untimely(const CheckedFix& fix, Output& output) {
   const auto imu_ns = buffer.newest_imu_ns();
+  if (!imu_ns) {
+    // Its stamp cannot be judged yet.
+    refuse("before_imu", "Fix refused: there is no usable IMU sample yet.", fix.stamp_ns, output);
+    now_ns = fix.stamp_ns;
+    return true;
+  }
   if (buffer.has_fix_at(fix.stamp_ns)) {
     refuse("duplicate_stamp",
            "Fix refused: there was one with its stamp " + std::to_string(to_seconds(fix.stamp_ns)) +
@@ -181,7 +182,7 @@ bool GpsOdometry::Impl::is_untimely(const CheckedFix& fix, Output& output) {
            output);
     return true;
   }
-  if (imu_ns && fix.stamp_ns > *imu_ns + from_seconds(config.future_limit_s)) {
+  if (fix.stamp_ns > *imu_ns + from_seconds(config.future_limit_s)) {
     fixes_ahead = fix.stamp_ns > newest_ahead_ns ? fixes_ahead + 1 : 1;
     newest_ahead_ns = fix.stamp_ns;
     refuse("future_stamp",
@@ -205,9 +206,6 @@ MapFix GpsOdometry::Impl::place(const CheckedFix& fix) const {
 void GpsOdometry::Impl::take_fix(const GnssFix& message, Output& output) {
   ++fixes_received;
   if (const auto fix = checked(message, output)) {
-    if (!buffer.newest_imu_ns()) {
-      see(fix->stamp_ns);
-    }
     if (!frame) {
       frame.emplace(
           Datum{fix->place.latitude_deg, fix->place.longitude_deg, fix->place.height_m, 0});

@@ -2,6 +2,8 @@
 // Copyright the Trigpoint developers
 #include "imu_checks.hpp"
 
+#include "fix_checks.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -101,6 +103,11 @@ ImuVerdict ImuChecks::check(const ImuSample& sample) {
     return refuse("imu_out_of_range",
                   "IMU sample refused: %g m/s^2, expected at most 200 (milli-g?).",
                   force);
+  }
+  if (!is_usable_stamp(sample.stamp_ns)) {
+    return refuse("imu_stamp_out_of_range",
+                  "IMU sample refused: its stamp is %g s, expected 0 to 8e9.",
+                  to_seconds(sample.stamp_ns));
   }
   ImuVerdict verdict = check_stamp(sample);
   if (!verdict.reason.empty() && !verdict.clock_reset) {
