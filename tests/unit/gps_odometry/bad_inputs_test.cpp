@@ -55,6 +55,8 @@ INSTANTIATE_TEST_SUITE_P(
         BadFix{"out_of_range", [](GnssFix& f) { f.longitude_deg += 360.0; }},
         BadFix{"zero_position", [](GnssFix& f) { f.latitude_deg = f.longitude_deg = 0.0; }},
         BadFix{"no_fix", [](GnssFix& f) { f.status = FixStatus::kNoFix; }},
+        BadFix{"stamp_out_of_range",
+               [](GnssFix& f) { f.stamp_ns = std::numeric_limits<Nanoseconds>::min(); }},
         BadFix{"future_stamp", [](GnssFix& f) { f.stamp_ns += 3600 * kNanosecondsPerSecond; }},
         BadFix{"too_old", [](GnssFix& f) { f.stamp_ns -= 60 * kNanosecondsPerSecond; }},
         BadFix{"gate", [](GnssFix& f) { f.latitude_deg += 3.0 / 111'200.0; }},
