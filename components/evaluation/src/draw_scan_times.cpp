@@ -22,7 +22,8 @@ std::string draw_scan_times(const SessionData& data, const std::string& gnuplot)
   const auto quoted = picture.data("scans.dat", rows);
   std::ostringstream body;
   body << "set title 'Processing time of each scan'\nset xlabel 'time [s]'\nset ylabel 'ms'\n"
-       << "set y2label 'points'\nset ytics nomirror\nset y2tics\nset grid\nset key top right\n"
+       << "set y2label 'points'\nset ytics nomirror\nset y2tics\nset grid\nset key outside below "
+          "center horizontal\n"
        << "set yrange [0:*]\nset y2range [0:*]\n"
        << "plot " << quoted << " using 1:3 axes x1y2 with lines lc rgb '#bbbbbb' title 'points', "
        << quoted << " using 1:2 with lines lw 1.5 lc rgb '#1f6fbf' title 'scan'\n";

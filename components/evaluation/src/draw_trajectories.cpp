@@ -59,12 +59,6 @@ std::vector<Curve> curves_of(const SessionData& data) {
       curves.push_back(std::move(curve));
     }
   };
-  if (data.datum) {
-    const auto all = fix_positions(data.fixes, *data.datum, FixChoice::kAll);
-    const auto withheld = fix_positions(data.fixes, *data.datum, FixChoice::kWithheld);
-    add({"fixes", "GPS fixes (antenna)", all, "points pt 2 ps 0.7 lc rgb '#7fb2e5'"});
-    add({"withheld", "withheld fixes", withheld, "points pt 6 ps 0.9 lc rgb '#b06fc7'"});
-  }
   add({"truth", "truth", data.truth, "lines lw 5 lc rgb '#f2c230'"});
   add({"gps", "gps filter", data.gps, "lines lw 1.5 lc rgb '#1f6fbf'"});
   if (const auto T_map_odom = lio_placement(data)) {
@@ -76,6 +70,12 @@ std::vector<Curve> curves_of(const SessionData& data) {
     add({"lio", "lio (odom, not aligned)", data.lio, "lines lw 2 lc rgb '#e8772e'"});
   }
   add({"fused", "fused", data.fused, "lines lw 2 lc rgb '#17853c'"});
+  if (data.datum) {
+    const auto all = fix_positions(data.fixes, *data.datum, FixChoice::kAll);
+    const auto withheld = fix_positions(data.fixes, *data.datum, FixChoice::kWithheld);
+    add({"fixes", "GPS fixes (antenna)", all, "points pt 2 ps 0.6 lc rgb '#3b8fd9'"});
+    add({"withheld", "withheld fixes", withheld, "points pt 6 ps 0.9 lc rgb '#8e3fae'"});
+  }
   return curves;
 }
 

@@ -18,6 +18,7 @@ namespace file = exporter::session_file;
 constexpr int kWidth_px = 1300;
 constexpr int kPanelHeight_px = 230;
 constexpr double kLowestSigma_m = 1e-3;
+constexpr double kLowestError_m = 1e-3;
 constexpr double kUnknownSigma_m = 500.0;  ///< sqrt(kUnknownVariance) is 1000
 constexpr std::array<const char*, 3> kAxisNames{"east", "north", "up"};
 constexpr std::array<const char*, 3> kAxisFiles{"east.dat", "north.dat", "up.dat"};
@@ -57,9 +58,12 @@ class UncertaintyPicture {
     std::ostringstream body;
     const bool has_error = !data_.truth.empty();
     const int panels = has_error ? 5 : 4;
-    body << "set multiplot layout " << panels << ",1 margins 0.075,0.86,0.05,0.97 spacing 0.035\n"
+    body << "set multiplot layout " << panels
+         << ",1 title 'GPS uncertainty per axis, and what the gate chose' margins "
+            "0.075,0.84,0.05,0.965 spacing 0.035\n"
          << "set xrange [0:" << std::max(1.0, time(span_.end_ns)) << "]\n"
-         << "set grid lc rgb '#dddddd'\nset tics out nomirror\nset key outside right top\n"
+         << "set grid lc rgb '#dddddd'\nset tics out nomirror\nset key outside right top Left "
+            "reverse samplen 2\n"
          << "set style fill solid 1.0 noborder\nset format x ''\n";
     for (std::size_t axis = 0; axis < 3; ++axis) {
       body << sigma_panel(axis);
@@ -125,7 +129,7 @@ class UncertaintyPicture {
     }
     text << outage_boxes(name + "_outage.box", range.highest_m / 1.35, range.highest_m);
     const auto quoted = picture_.data(kAxisFiles.at(axis), sigma_rows(axis));
-    text << quoted << " using 1:2 with lines lw 2 lc rgb '#1f6fbf' title 'GPS odometry sigma', "
+    text << quoted << " using 1:2 with lines lw 2 lc rgb '#1f6fbf' title 'GPS sigma', "
          << "\\\n     " << quoted
          << " using 1:3 with lines lw 1.5 dt 2 lc rgb '#c00000' title 'threshold', \\\n     "
          << picture_.data("alignment_" + std::string(kAxisFiles.at(axis)), alignment_rows(axis))
@@ -183,7 +187,8 @@ class UncertaintyPicture {
     std::vector<Eigen::Vector2d> points;
     const auto pairs = associate(thinned(trajectory), data_.truth).pairs;
     for (const auto& pair : pairs) {
-      points.emplace_back(time(pair.stamp_ns), (T * pair.estimate.p - pair.reference.p).norm());
+      const double error_m = (T * pair.estimate.p - pair.reference.p).norm();
+      points.emplace_back(time(pair.stamp_ns), std::max(error_m, kLowestError_m));
     }
     return points;
   }
@@ -221,7 +226,8 @@ class UncertaintyPicture {
 
   std::string error_panel() const {
     const auto T_map_odom = lio_placement(data_);
-    return "set ylabel 'error [m]'\n" +
+    // Centimetres with GPS and tens of metres without: only a logarithm shows both.
+    return "set logscale y\nset ylabel 'error [m]'\n" +
            plot(
                {curve("gps.error", "gps filter", errors(data_.gps), "lines lw 1 lc rgb '#1f6fbf'"),
                 T_map_odom ? curve("lio.error",

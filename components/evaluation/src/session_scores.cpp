@@ -138,16 +138,17 @@ std::string outage_table(const ScoreBlock& block) {
 }
 
 std::string print(const ScoreBlock& block) {
+  const bool positions = !block.evaluations.empty() &&
+                         block.evaluations.front().reference_kind == ReferenceKind::kPositions;
   std::string text =
       "### Against " + block.reference_name + "\n\n" + block.remark +
-      "Position error in metres at base_link, axes of map. Coverage: share of the "
-      "reference from the file's first pose, and of the whole reference. " +
+      "Position error in metres at " + (positions ? "the antenna" : "base_link") +
+      ", axes of map. Coverage: share of the reference from the file's first pose, and of the "
+      "whole reference. " +
       std::string(file::kLio) +
       " lives in odom, so its row without alignment only tells where odom began.\n\n";
   text += error_table(block);
   text += "\nRelative translation error of segments of a given length (mean), and of the whole";
-  const bool positions = !block.evaluations.empty() &&
-                         block.evaluations.front().reference_kind == ReferenceKind::kPositions;
   text += positions ? "; positions only, after alignment by yaw + translation:\n\n"
                     : "; needs no alignment:\n\n";
   text += relative_table(block);

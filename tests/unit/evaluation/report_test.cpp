@@ -245,7 +245,7 @@ std::pair<unsigned, unsigned> png_size(const std::string& file) {
   return {word(16), word(20)};
 }
 
-TEST_F(Pictures, are_pngs_of_a_sensible_size_with_their_scripts_beside) {
+TEST_F(Pictures, are_pngs_of_a_sensible_size_that_their_scripts_draw_anew) {
   const ScratchFolder folder;
   make_session(folder.path());
   const auto result = write_report(folder.path());
@@ -260,17 +260,12 @@ TEST_F(Pictures, are_pngs_of_a_sensible_size_with_their_scripts_beside) {
   EXPECT_THAT(read_all(folder.file("report.md")), HasSubstr("![trajectories.png]"));
   EXPECT_TRUE(std::filesystem::exists(folder.file("plots/uncertainty.gp")));
   EXPECT_FALSE(std::filesystem::exists(folder.file("plots/uncertainty.log")));  // no complaints
-}
 
-TEST_F(Pictures, are_drawn_anew_by_their_scripts) {
-  const ScratchFolder folder;
-  make_session(folder.path());
-  write_report(folder.path());
-  const auto before = read_all(folder.file("trajectories.png"));
-  std::filesystem::remove(folder.file("trajectories.png"));
-  const auto command = "cd '" + folder.path() + "/plots' && gnuplot trajectories.gp";
-  ASSERT_EQ(std::system(command.c_str()), 0);
-  EXPECT_EQ(before, read_all(folder.file("trajectories.png")));
+  const auto before = read_all(folder.file("scan_times.png"));
+  std::filesystem::remove(folder.file("scan_times.png"));
+  const auto again = "cd '" + folder.path() + "/plots' && gnuplot scan_times.gp";
+  ASSERT_EQ(std::system(again.c_str()), 0);
+  EXPECT_EQ(before, read_all(folder.file("scan_times.png")));
 }
 
 TEST_F(Pictures, of_a_session_without_truth_map_and_datum_are_still_drawn) {
@@ -282,13 +277,16 @@ TEST_F(Pictures, of_a_session_without_truth_map_and_datum_are_still_drawn) {
   EXPECT_EQ(write_report(folder.path()).pictures.size(), 3U);
 }
 
-TEST_F(Pictures, that_cannot_be_drawn_are_told_and_an_old_one_is_not_left) {
+TEST(Report, does_not_leave_an_old_picture_where_none_can_be_drawn) {
   const ScratchFolder folder;
   make_session(folder.path());
-  write_report(folder.path());
+  write_all(folder.file("scan_times.png"), "old");
   std::filesystem::remove(folder.file("scans.csv"));
-  const auto result = write_report(folder.path());
+  ReportOptions options;
+  options.gnuplot = "false";  // draws nothing
+  const auto result = write_report(folder.path(), options);
   EXPECT_THAT(result.problems, testing::Contains(HasSubstr("no scan to draw")));
+  EXPECT_THAT(result.problems, testing::Contains(HasSubstr("gnuplot failed with exit code 1")));
   EXPECT_FALSE(std::filesystem::exists(folder.file("scan_times.png")));
 }
 
