@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "propagation.hpp"
+
+#include "trigpoint/base/so3.hpp"
+
+#include "random_state.hpp"
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace trigpoint::lio_mapper {
+
+namespace {
+
+using testing_support::random_covariance;
+using testing_support::random_state;
+
+const InertialStep kStep{{0, {0.4, -0.7, 1.1}, {1.0, -2.0, 9.0}},
+                         {10'000'000, {0.5, -0.6, 1.3}, {1.5, -2.5, 10.0}}};
+
+ErrorMatrix transition_of(const StepJacobian& jacobian) {
+  ErrorMatrix F = ErrorMatrix::Identity();
+  apply_transition(jacobian, F);
+  return F;
+}
+
+TEST(Propagation, transition_equals_the_numerical_one) {
+  constexpr double kDelta = 1e-6;
+  constexpr double kTolerance = 2e-6;  // second-order terms of central differences, and rounding
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    const State state = random_state(seed);
+    const ErrorMatrix F = transition_of(step_jacobian(state, kStep));
+    const State nominal = propagate(state, kStep);
+    for (int i = 0; i < error::kSize; ++i) {
+      ErrorVector e = ErrorVector::Zero();
+      e[i] = kDelta;
+      const ErrorVector column = (boxminus(propagate(boxplus(state, e), kStep), nominal) -
+                                  boxminus(propagate(boxplus(state, -e), kStep), nominal)) /
+                                 (2.0 * kDelta);
+      EXPECT_LT((F.col(i) - column).norm(), kTolerance) << "column " << i << " seed " << seed;
+    }
+  }
+}
+
+TEST(Propagation, covariance_is_transported_by_the_transition_and_grows_by_the_noise) {
+  const State state = random_state(2);
+  const StepJacobian jacobian = step_jacobian(state, kStep);
+  const ErrorMatrix P = random_covariance(3, 0.1);
+  const ErrorMatrix F = transition_of(jacobian);
+  ImuConfig noise;
+  ErrorMatrix propagated = P;
+  propagate_covariance(jacobian, noise, 1.0, propagated);
+  const ErrorMatrix Q = propagated - F * P * F.transpose();
+  const double dt_s = kStep.duration_s();
+  const double accel2 = noise.accel_noise_mps2_sqrthz * noise.accel_noise_mps2_sqrthz;
+  EXPECT_NEAR(Q(error::kVelocity, error::kVelocity), accel2 * dt_s, 1e-12);
+  EXPECT_NEAR(Q(error::kPosition, error::kVelocity), accel2 * dt_s * dt_s / 2.0, 1e-12);
+  EXPECT_NEAR(Q(error::kPosition, error::kPosition), accel2 * dt_s * dt_s * dt_s / 3.0, 1e-12);
+  EXPECT_NEAR(Q(error::kYawMapOdom, error::kYawMapOdom), 0.0, 1e-12);
+}
+
+/// A circle of 20 m at 8 m/s, level, sampled at 100 Hz: closed form in velocity and position.
+TEST(Propagation, follows_a_circle_to_a_millimetre_over_ten_seconds) {
+  constexpr double kRadius_m = 20.0;
+  constexpr double kSpeed_mps = 8.0;
+  constexpr double kRate_radps = kSpeed_mps / kRadius_m;
+  State state;
+  state.v_odom_mps = {kSpeed_mps, 0.0, 0.0};
+  const auto sample = [&](Nanoseconds stamp_ns) {
+    return InertialSample{
+        stamp_ns, {0.0, 0.0, kRate_radps}, {0.0, kSpeed_mps * kRate_radps, 9.80665}};
+  };
+  constexpr Nanoseconds kPeriod_ns = 10'000'000;
+  for (int i = 0; i < 1000; ++i) {
+    state = propagate(state, {sample(i * kPeriod_ns), sample((i + 1) * kPeriod_ns)});
+  }
+  const double angle = kRate_radps * 10.0;
+  const Eigen::Vector3d expected{
+      kRadius_m * std::sin(angle), kRadius_m * (1.0 - std::cos(angle)), 0.0};
+  EXPECT_LT((state.T_odom_base.p - expected).norm(), 1e-3);
+  EXPECT_NEAR(yaw_of(state.T_odom_base.q), wrap_angle(angle), 1e-9);
+}
+
+TEST(Path, goes_on_between_and_beyond_its_nodes_as_the_motion_says) {
+  Path path;
+  path.push_back({0, {}, {1.0, 0.0, 0.0}, {2.0, 0.0, 0.0}, {0.0, 0.0, 0.5}});
+  path.push_back({100'000'000,
+                  {from_yaw(0.05), {0.11, 0.0, 0.0}},
+                  {1.2, 0.0, 0.0},
+                  Eigen::Vector3d::Zero(),
+                  Eigen::Vector3d::Zero()});
+  EXPECT_NEAR(path.at(50'000'000).p.x(), 0.05 + 0.5 * 2.0 * 0.05 * 0.05, 1e-12);
+  EXPECT_NEAR(yaw_of(path.at(50'000'000).q), 0.025, 1e-12);
+  EXPECT_NEAR(path.at(200'000'000).p.x(), 0.11 + 0.12, 1e-12);
+  EXPECT_NEAR(path.at(-50'000'000).p.x(), -0.05 + 0.5 * 2.0 * 0.05 * 0.05, 1e-12);
+}
+
+}  // namespace
+
+}  // namespace trigpoint::lio_mapper
