@@ -16,6 +16,7 @@ import subprocess
 import sys
 
 LONGEST_FILE = 500
+LONGEST_TEST_FILE = 650
 CORES = ("gps_odometry", "lio_mapper", "fusion_gate")
 GENERATED = r"(builtin_interfaces|std_msgs|geometry_msgs|nav_msgs|sensor_msgs|tf2_msgs|diagnostic_msgs|rosgraph_msgs|trigpoint_msgs)\.h"
 DDS_HEADER = re.compile(rf"^(fastdds/|fastrtps/|fastcdr/|dds/|ddsc/|{GENERATED}$)")
@@ -147,9 +148,11 @@ def every_source_has_its_licence(tree):
 
 def no_file_is_too_long(tree):
     return [
-        f"{path} has {lines} lines; at most {LONGEST_FILE}"
+        f"{path} has {lines} lines; at most {longest}"
         for path, text in tree.sources()
-        if (lines := text.count("\n")) > LONGEST_FILE
+        # A test file may hold the cases of one long source whole.
+        for longest in [LONGEST_TEST_FILE if path.startswith("tests/") else LONGEST_FILE]
+        if (lines := text.count("\n")) > longest
     ]
 
 

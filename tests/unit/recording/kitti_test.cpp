@@ -105,7 +105,8 @@ TEST(KittiDrive, reads_the_right_fields_of_the_oxts) {
   EXPECT_EQ(2.0, fixes[0].altitude_m);
   EXPECT_EQ(FixStatus::kGbas, fixes[0].status);
   EXPECT_EQ(FixStatus::kNoFix, fixes[1].status) << "position mode 2 is dead reckoning";
-  EXPECT_EQ(23.0 * 23.0, fixes[0].covariance_enu_m2(0, 0));
+  // pos_accuracy (here 23) is the root of the sum of both axes' squares.
+  EXPECT_NEAR(23.0 * 23.0 / 2.0, fixes[0].covariance_enu_m2(0, 0), 1e-9);
 }
 
 TEST(KittiDrive, names_file_and_line_of_what_is_damaged) {
