@@ -89,7 +89,7 @@ class Process {
   }
 
   void close() {
-    keep([&] { session_->close(); });
+    keep([&] { session_->close(core_.status()); });
   }
 
   bool failed() const { return disk_.failed(); }

@@ -376,4 +376,8 @@ std::optional<Datum> GpsOdometry::datum() const {
   return impl_->datum;
 }
 
+GpsStatus GpsOdometry::status() const {
+  return impl_->status();
+}
+
 }  // namespace trigpoint::gps_odometry

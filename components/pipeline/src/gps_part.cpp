@@ -19,15 +19,14 @@ void GpsPart::on_odometry(const Odometry& odometry) {
 
 void GpsPart::on_status(const GpsStatus& status) {
   statuses_.append(status);
-  last_ = status;
 }
 
 void GpsPart::on_datum(const Datum& datum) {
   exporter::write_datum(path_in(session_, file::kDatum), datum);
 }
 
-void GpsPart::close() {
-  counts_.write(exporter::counts_of(last_));
+void GpsPart::close(const GpsStatus& status) {
+  counts_.write(exporter::counts_of(status));
 }
 
 }  // namespace trigpoint::pipeline

@@ -127,6 +127,10 @@ std::optional<Alignment> Lockstep::best_alignment() const {
   return impl_->gate.best_alignment();
 }
 
+GpsStatus Lockstep::gps_status() const {
+  return impl_->gps.status();
+}
+
 LioStatus Lockstep::lio_status() const {
   return impl_->mapper.status();
 }

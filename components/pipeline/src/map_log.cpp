@@ -56,7 +56,7 @@ class Session {
     if (const auto alignment = cores.best_alignment()) {
       gate_.on_alignment(*alignment, cores.lio_status().aligned);
     }
-    gps_.close();
+    gps_.close(cores.gps_status());
     mapper_.close(cores.lio_status());
     gate_.close();
     log_.close();

@@ -40,6 +40,9 @@ class GpsOdometry {
 
   std::optional<Datum> datum() const;
 
+  /// The newest status, also between fixes.
+  GpsStatus status() const;
+
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;

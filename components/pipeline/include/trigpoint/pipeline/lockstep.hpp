@@ -53,6 +53,7 @@ class Lockstep {
 
   std::optional<Datum> datum() const;
   std::optional<Alignment> best_alignment() const;
+  GpsStatus gps_status() const;
   LioStatus lio_status() const;
 
  private:

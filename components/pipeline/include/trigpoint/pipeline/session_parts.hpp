@@ -25,14 +25,13 @@ class GpsPart {
   void on_odometry(const Odometry& odometry);
   void on_status(const GpsStatus& status);
   void on_datum(const Datum& datum);
-  void close();
+  void close(const GpsStatus& status);
 
  private:
   std::string session_;
   exporter::TrajectoryWriter trajectory_;
   exporter::GpsStatusLog statuses_;
   exporter::CountsWriter counts_;
-  GpsStatus last_;
 };
 
 /// lio.tum, scans.csv, keyframes.sqlite and the mapper's counts.
