@@ -139,7 +139,7 @@ std::string draw_trajectories(const SessionData& data, const std::string& gnuplo
   std::ostringstream body;
   body << "set title 'Top view: trajectories" << (cloud.empty() ? "" : " over the map")
        << ", frame " << (data.fused.empty() && data.gps.empty() ? "odom" : "map") << "'\n"
-       << "set xlabel 'east [m]'\nset ylabel 'north [m]'\n"
+       << "set xlabel 'east [m]' offset 0,0.6\nset ylabel 'north [m]'\n"
        << "set size ratio -1\nset grid lc rgb '#cccccc'\nset tics out nomirror\n"
        << "set key outside below center horizontal\n"
        << "set palette defined (0 '#ffffff', 0.02 '#ececec', 1 '#505050')\nunset colorbox\n"
