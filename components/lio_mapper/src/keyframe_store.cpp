@@ -14,13 +14,15 @@ namespace trigpoint::lio_mapper {
 
 namespace {
 
-constexpr int kFormatVersion = 1;   // PRAGMA user_version
+constexpr int kFormatVersion = 2;   // PRAGMA user_version
+constexpr int kBusy_ms = 5000;      // one may read while another writes
 constexpr int kPoseNumbers = 7;     // x y z qx qy qz qw
 constexpr int kYawPoseNumbers = 4;  // yaw x y z
 
 constexpr const char* kSchema =
     "CREATE TABLE IF NOT EXISTS keyframes("
-    " id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, odom_epoch INTEGER NOT NULL,"
+    " row INTEGER PRIMARY KEY, id INTEGER NOT NULL, stamp_ns INTEGER NOT NULL,"
+    " odom_epoch INTEGER NOT NULL,"
     " T_odom_base BLOB NOT NULL, pose_covariance BLOB NOT NULL,"
     " aligned INTEGER NOT NULL, T_map_odom BLOB NOT NULL, points_base BLOB NOT NULL);";
 
@@ -33,6 +35,7 @@ class Database {
       sqlite3_close(handle_);
       throw std::runtime_error(file_ + ": cannot be opened as a keyframe store: " + cause);
     }
+    sqlite3_busy_timeout(handle_, kBusy_ms);
   }
 
   ~Database() { sqlite3_close(handle_); }
@@ -101,6 +104,8 @@ class Statement {
     return static_cast<std::size_t>(sqlite3_column_bytes(handle_, column));
   }
 
+  [[noreturn]] void fail(const std::string& what) const { database_.fail(what); }
+
   /// Copies a blob that must have exactly `size` bytes.
   void copy(int column, void* to, std::size_t size) const {
     if (this->size(column) != size) {
@@ -132,6 +137,11 @@ std::int64_t version_of(Database& database) {
   return statement.integer(0);
 }
 
+bool has_tables(Database& database) {
+  Statement statement(database, "SELECT name FROM sqlite_master WHERE type = 'table'");
+  return statement.step();
+}
+
 void check_version(Database& database) {
   const std::int64_t version = version_of(database);
   if (version != kFormatVersion) {
@@ -155,6 +165,9 @@ Keyframe keyframe_of(const Statement& row) {
   keyframe.T_map_odom = {yaw_pose[0], {yaw_pose[1], yaw_pose[2], yaw_pose[3]}};
   keyframe.points_base.resize(row.size(7) / sizeof(PointXyzi));
   row.copy(7, keyframe.points_base.data(), keyframe.points_base.size() * sizeof(PointXyzi));
+  if (!keyframe.T_odom_base.is_finite() || !keyframe.T_map_odom.pose().is_finite()) {
+    row.fail("keyframe " + std::to_string(keyframe.id) + " has a pose that is not finite");
+  }
   return keyframe;
 }
 
@@ -167,15 +180,25 @@ struct KeyframeWriter::Impl {
   /// Write-ahead log: a killed writer loses at most the row that it was writing. NORMAL leaves the
   /// flush to the disk to the system, which only a power cut can exploit.
   Statement& prepare() {
-    database.run("PRAGMA journal_mode=WAL; PRAGMA synchronous=NORMAL;");
     if (version_of(database) == 0) {
-      database.run(kSchema);
-      database.run("PRAGMA user_version=" + std::to_string(kFormatVersion));
+      create();
     }
     check_version(database);
+    database.run("PRAGMA journal_mode=WAL; PRAGMA synchronous=NORMAL;");
     statement = std::make_unique<Statement>(
-        database, "INSERT INTO keyframes VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)");
+        database,
+        "INSERT INTO keyframes(id, stamp_ns, odom_epoch, T_odom_base, pose_covariance, aligned, "
+        "T_map_odom, points_base) VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)");
     return *statement;
+  }
+
+  /// In one transaction, so that no death leaves tables without a version.
+  void create() {
+    if (has_tables(database)) {
+      database.fail("is a database of another program, it has tables but no format version");
+    }
+    database.run(std::string("BEGIN IMMEDIATE; ") + kSchema +
+                 " PRAGMA user_version=" + std::to_string(kFormatVersion) + "; COMMIT;");
   }
 
   Database database;
@@ -217,7 +240,7 @@ std::uint64_t read_keyframes(const std::string& file,
   check_version(database);
   Statement rows(database,
                  "SELECT id, stamp_ns, odom_epoch, T_odom_base, pose_covariance, aligned, "
-                 "T_map_odom, points_base FROM keyframes ORDER BY stamp_ns, id");
+                 "T_map_odom, points_base FROM keyframes ORDER BY stamp_ns, row");
   std::uint64_t count = 0;
   while (rows.step()) {
     visit(keyframe_of(rows));

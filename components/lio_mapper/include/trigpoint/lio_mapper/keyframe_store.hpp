@@ -11,7 +11,7 @@
 
 namespace trigpoint::lio_mapper {
 
-/// Append-only keyframes on disk (SQLite, one row each, format in the README): what was written
+/// Append-only keyframes on disk (SQLite, one row each, format in KEYFRAMES.md): what was written
 /// survives the death of the writer.
 class KeyframeWriter {
  public:

@@ -1,0 +1,287 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "trigpoint/lio_mapper/keyframe_store.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sqlite3.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+#include <vector>
+
+namespace trigpoint::lio_mapper {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// A folder of its own for each test, removed afterwards.
+class KeyframeStore : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string pattern = std::filesystem::temp_directory_path() / "keyframe_store_XXXXXX";
+    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+  }
+
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::string file() const { return folder_ / "keyframes.sqlite"; }
+
+  std::filesystem::path folder_;
+};
+
+Keyframe keyframe(int i, int points = 100) {
+  Keyframe k;
+  k.id = static_cast<std::uint64_t>(i);
+  k.stamp_ns = 1'700'000'000'000'000'001 + i * 1'000'000'000LL;
+  k.odom_epoch = 4'000'000'000U;
+  k.T_odom_base = {Eigen::Quaterniond(0.5, -0.5, 0.5, 0.5), {0.1 * i, 1.0 / 3.0, -7.0}};
+  for (int j = 0; j < 36; ++j) {
+    k.pose_covariance(j / 6, j % 6) = 0.001 * j + i;
+  }
+  k.aligned = i % 2 == 1;
+  k.T_map_odom = {0.3 + i, {1e5 / 3.0, -2.0, 3.0}};
+  for (int j = 0; j < points; ++j) {
+    const auto v = static_cast<float>(j) / 3.0F;
+    k.points_base.push_back({v, -v, v + static_cast<float>(i), 2.0F * v});
+  }
+  return k;
+}
+
+void expect_equal(const Keyframe& a, const Keyframe& b) {
+  EXPECT_EQ(a.id, b.id);
+  EXPECT_EQ(a.stamp_ns, b.stamp_ns);
+  EXPECT_EQ(a.odom_epoch, b.odom_epoch);
+  EXPECT_EQ(a.T_odom_base.q.coeffs(), b.T_odom_base.q.coeffs());
+  EXPECT_EQ(a.T_odom_base.p, b.T_odom_base.p);
+  EXPECT_EQ(a.pose_covariance, b.pose_covariance);
+  EXPECT_EQ(a.aligned, b.aligned);
+  EXPECT_EQ(a.T_map_odom.yaw_rad, b.T_map_odom.yaw_rad);
+  EXPECT_EQ(a.T_map_odom.p, b.T_map_odom.p);
+  ASSERT_EQ(a.points_base.size(), b.points_base.size());
+  for (std::size_t i = 0; i < a.points_base.size(); ++i) {
+    EXPECT_EQ(a.points_base[i].position(), b.points_base[i].position());
+    EXPECT_EQ(a.points_base[i].intensity, b.points_base[i].intensity);
+  }
+}
+
+std::vector<Keyframe> read_all(const std::string& file) {
+  std::vector<Keyframe> all;
+  const std::uint64_t count = read_keyframes(file, [&](const Keyframe& k) { all.push_back(k); });
+  EXPECT_EQ(count, all.size());
+  return all;
+}
+
+/// What reading says when it fails; empty when it does not.
+std::string error_of_reading(const std::string& file) {
+  try {
+    read_keyframes(file, [](const Keyframe&) {});
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr(file));
+    return error.what();
+  }
+  return "";
+}
+
+std::string error_of_writing(const std::string& file) {
+  try {
+    KeyframeWriter writer(file);
+    writer.append(keyframe(0));
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr(file));
+    return error.what();
+  }
+  return "";
+}
+
+void run_sql(const std::string& file, const std::string& sql) {
+  sqlite3* database = nullptr;
+  ASSERT_EQ(sqlite3_open(file.c_str(), &database), SQLITE_OK);
+  EXPECT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK)
+      << sqlite3_errmsg(database);
+  sqlite3_close(database);
+}
+
+void write(const std::string& file, int count) {
+  KeyframeWriter writer(file);
+  for (int i = 0; i < count; ++i) {
+    writer.append(keyframe(i));
+  }
+}
+
+TEST_F(KeyframeStore, gives_back_every_bit_of_what_was_written) {
+  write(file(), 5);
+  const auto all = read_all(file());
+  ASSERT_EQ(all.size(), 5U);
+  for (int i = 0; i < 5; ++i) {
+    expect_equal(all[static_cast<std::size_t>(i)], keyframe(i));
+  }
+}
+
+TEST_F(KeyframeStore, keeps_a_keyframe_without_points) {
+  {
+    KeyframeWriter writer(file());
+    writer.append(keyframe(1, 0));
+  }
+  expect_equal(read_all(file()).at(0), keyframe(1, 0));
+}
+
+TEST_F(KeyframeStore, is_read_in_order_of_time) {
+  {
+    KeyframeWriter writer(file());
+    for (const int i : {3, 0, 2, 1}) {
+      writer.append(keyframe(i));
+    }
+  }
+  const auto all = read_all(file());
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(all.at(i).id, i);
+  }
+}
+
+TEST_F(KeyframeStore, is_continued_by_a_mapper_that_was_started_again_and_counts_from_zero) {
+  write(file(), 3);
+  write(file(), 2);
+  EXPECT_EQ(read_all(file()).size(), 5U);
+}
+
+TEST_F(KeyframeStore, can_be_read_while_it_is_written) {
+  KeyframeWriter writer(file());
+  for (int i = 0; i < 10; ++i) {
+    writer.append(keyframe(i));
+    EXPECT_EQ(read_all(file()).size(), static_cast<std::size_t>(i + 1));
+  }
+}
+
+/// Writes until it is killed; tells through the pipe how many keyframes append() has returned from.
+[[noreturn]] void write_for_ever(const std::string& file, int pipe) {
+  KeyframeWriter writer(file);
+  for (int i = 0;; ++i) {
+    writer.append(keyframe(i, 5000));
+    if (::write(pipe, &i, sizeof i) != sizeof i) {
+      _exit(1);
+    }
+  }
+}
+
+/// The last number that the child told before it was killed, after at least `least` keyframes.
+int kill_writer_after(const std::string& file, int least) {
+  std::array<int, 2> pipe{};
+  if (::pipe(pipe.data()) != 0) {
+    return -1;
+  }
+  const pid_t child = fork();
+  if (child == 0) {
+    close(pipe[0]);
+    write_for_ever(file, pipe[1]);
+  }
+  close(pipe[1]);
+  int last = -1;
+  int told = -1;
+  while (last < least && ::read(pipe[0], &told, sizeof told) == sizeof told) {
+    last = told;
+  }
+  kill(child, SIGKILL);
+  int status = 0;
+  waitpid(child, &status, 0);
+  while (::read(pipe[0], &told, sizeof told) == sizeof told) {
+    last = told;
+  }
+  close(pipe[0]);
+  return WIFSIGNALED(status) ? last : -1;
+}
+
+TEST_F(KeyframeStore, keeps_what_was_appended_when_the_writer_is_killed) {
+  for (const int least : {0, 3, 17, 40}) {
+    const std::string killed = folder_ / ("killed_" + std::to_string(least));
+    const int last = kill_writer_after(killed, least);
+    ASSERT_GE(last, least);
+    const auto all = read_all(killed);
+    // The row that was being written when the signal came may or may not be there.
+    ASSERT_GE(all.size(), static_cast<std::size_t>(last) + 1);
+    ASSERT_LE(all.size(), static_cast<std::size_t>(last) + 2);
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      expect_equal(all[i], keyframe(static_cast<int>(i), 5000));
+    }
+    write(killed, 1);
+    EXPECT_EQ(read_all(killed).size(), all.size() + 1);
+  }
+}
+
+TEST_F(KeyframeStore, appends_in_milliseconds) {
+  constexpr int kCount = 200;
+  constexpr double kMost_ms = 20.0;  // 1 ms is usual; the machine may be busy
+  const Keyframe k = keyframe(0, 5000);
+  KeyframeWriter writer(file());
+  const auto begin = std::chrono::steady_clock::now();
+  for (int i = 0; i < kCount; ++i) {
+    writer.append(k);
+  }
+  const std::chrono::duration<double, std::milli> taken = std::chrono::steady_clock::now() - begin;
+  RecordProperty("append_us", static_cast<int>(1000.0 * taken.count() / kCount));
+  EXPECT_LT(taken.count() / kCount, kMost_ms);
+}
+
+TEST_F(KeyframeStore, names_a_missing_file_and_does_not_create_it) {
+  EXPECT_THAT(error_of_reading(file()), HasSubstr("no such file"));
+  EXPECT_FALSE(std::filesystem::exists(file()));
+}
+
+TEST_F(KeyframeStore, refuses_what_is_no_database) {
+  std::ofstream(file()) << std::string(5000, 'x');
+  EXPECT_THAT(error_of_reading(file()), HasSubstr("not a database"));
+  EXPECT_THAT(error_of_writing(file()), HasSubstr("not a database"));
+}
+
+TEST_F(KeyframeStore, refuses_another_format_version) {
+  write(file(), 1);
+  run_sql(file(), "PRAGMA user_version=77");
+  EXPECT_THAT(error_of_reading(file()), HasSubstr("format version 77, this program reads 2"));
+  EXPECT_THAT(error_of_writing(file()), HasSubstr("format version 77"));
+}
+
+TEST_F(KeyframeStore, refuses_a_database_of_another_program_and_leaves_it_alone) {
+  run_sql(file(), "CREATE TABLE messages(id INTEGER)");
+  EXPECT_THAT(error_of_writing(file()), HasSubstr("database of another program"));
+  EXPECT_THAT(error_of_reading(file()), HasSubstr("format version 0"));
+}
+
+TEST_F(KeyframeStore, refuses_a_truncated_file) {
+  write(file(), 50);
+  std::filesystem::resize_file(file(), std::filesystem::file_size(file()) / 2);
+  EXPECT_THAT(error_of_reading(file()), HasSubstr("malformed"));
+}
+
+TEST_F(KeyframeStore, refuses_blobs_of_the_wrong_length) {
+  write(file(), 1);
+  run_sql(file(), "UPDATE keyframes SET points_base = x'00112233'");
+  EXPECT_THAT(error_of_reading(file()), HasSubstr("points_base has 4 bytes"));
+  run_sql(file(), "UPDATE keyframes SET T_odom_base = x''");
+  EXPECT_THAT(error_of_reading(file()), HasSubstr("T_odom_base has 0 bytes, 56 expected"));
+}
+
+TEST_F(KeyframeStore, refuses_a_pose_that_is_not_finite) {
+  {
+    KeyframeWriter writer(file());
+    Keyframe broken = keyframe(9);
+    broken.T_odom_base.p.x() = kNaN;
+    writer.append(broken);
+  }
+  EXPECT_THAT(error_of_reading(file()), HasSubstr("keyframe 9 has a pose that is not finite"));
+}
+
+TEST_F(KeyframeStore, names_a_folder_that_cannot_be_written) {
+  EXPECT_THAT(error_of_writing(folder_ / "missing" / "keyframes.sqlite"),
+              HasSubstr("unable to open"));
+}
+
+}  // namespace
+}  // namespace trigpoint::lio_mapper
