@@ -39,8 +39,8 @@ struct SurfelMapConfig {
 /// Noise of the IMU as the filter sees it: vibration and scale errors included, so larger than a
 /// data sheet's.
 struct ImuConfig {
-  double gyro_noise_radps_sqrthz{2e-3};
-  double accel_noise_mps2_sqrthz{3e-2};
+  double gyro_noise_radps_sqrthz{5e-4};
+  double accel_noise_mps2_sqrthz{2e-2};
   double gyro_bias_walk_radps_sqrts{2e-5};
   double accel_bias_walk_mps2_sqrts{3e-4};
   double initial_gyro_bias_sigma_radps{0.01};
@@ -62,7 +62,7 @@ struct MatchingConfig {
   double range_sigma_m{0.02};
   double angle_sigma_rad{1.5e-3};  ///< beam direction and divergence: counts at grazing incidence
   double robust_width{2.0};        ///< residuals beyond this many sigmas lose weight (Huber)
-  double independent_residuals{300.0};  ///< residuals count as at most this many independent ones
+  double independent_residuals{100.0};  ///< residuals count as at most this many independent ones
   std::int64_t min_matches{50};
   std::int64_t max_iterations{5};
   double converged_position_m{1e-3};
