@@ -45,6 +45,15 @@ TEST(VoxelTiles, keep_neighbouring_cubes_apart) {
   EXPECT_EQ(emitted.all.size(), 2U);
 }
 
+TEST(VoxelTiles, keep_the_tiles_on_both_sides_of_zero_apart) {
+  Emitted emitted;
+  VoxelTiles tiles(0.1, kNoLimit, emitted.collect());
+  // 512 cubes apart: the same cube of two tiles.
+  tiles.add({{-0.05F, 0.05F, 0.05F, 0.0F}, {51.15F, 0.05F, 0.05F, 0.0F}});
+  tiles.finish();
+  EXPECT_EQ(emitted.all.size(), 2U);
+}
+
 TEST(VoxelTiles, leave_out_points_that_are_not_places) {
   Emitted emitted;
   VoxelTiles tiles(0.1, kNoLimit, emitted.collect());
