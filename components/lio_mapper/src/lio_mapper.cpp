@@ -66,6 +66,7 @@ struct LioMapper::Impl {
   void queue(Sweep sweep, Output& output);
   void process_what_is_covered(Output& output);
   void start_when_possible(Output& output);
+  void begin(Output& output);
   void process_front(Output& output);
   void refuse_front(const std::string& reason, const std::string& text, Output& output);
   void refuse_sweep(const std::string& reason,
@@ -163,9 +164,12 @@ void LioMapper::Impl::start_when_possible(Output& output) {
     refuse_front(
         *objection_to(sweeps.front()), "refused a sweep that the IMU does not cover", output);
   }
-  if (!can_start(config.start, imu, sweeps)) {
-    return;
+  if (can_start(config.start, imu, sweeps)) {
+    begin(output);
   }
+}
+
+void LioMapper::Impl::begin(Output& output) {
   const StartResult result = start(config, T_base_lidar, imu, sweeps);
   if (result.trouble) {
     if (to_seconds(imu.newest_ns() - trouble_told_ns) > 1.0) {
@@ -402,6 +406,11 @@ Output LioMapper::on_state_update(const StateUpdate& update) {
 Output LioMapper::finish() {
   Output output;
   Impl& impl = *impl_;
+  // A log shorter than the levelling window starts with what it has.
+  if (!impl.filter && impl.sweeps.size() >= 2 && !impl.imu.empty() &&
+      impl.sweeps[1].end_ns <= impl.imu.newest_ns()) {
+    impl.begin(output);
+  }
   while (impl.filter && !impl.sweeps.empty() &&
          to_seconds(impl.sweeps.front().end_ns - impl.imu.newest_ns()) < kHeldImu_s) {
     impl.process_front(output);

@@ -156,12 +156,14 @@ ImuSummary summarize(const ImuBuffer& imu, Nanoseconds from_ns, Nanoseconds to_n
     const double dt_s = steps[i].duration_s();
     const Vector3d gyro = 0.5 * (steps[i].begin.gyro_radps + steps[i].end.gyro_radps);
     const std::size_t half = 2 * i < steps.size() ? 0 : 1;
+    const Eigen::Quaterniond q_begin_end = (q_begin_base * so3_exp(gyro * dt_s)).normalized();
     half_sums[half] +=
-        q_begin_base * (0.5 * dt_s * (steps[i].begin.accel_mps2 + steps[i].end.accel_mps2));
+        0.5 * dt_s *
+        (q_begin_base * steps[i].begin.accel_mps2 + q_begin_end * steps[i].end.accel_mps2);
     half_s[half] += dt_s;
     turned_rad += dt_s * gyro;
     square += dt_s * gyro.squaredNorm();
-    q_begin_base = (q_begin_base * so3_exp(gyro * dt_s)).normalized();
+    q_begin_base = q_begin_end;
   }
   const double duration_s = half_s[0] + half_s[1];
   summary.mean_gyro_radps = turned_rad / duration_s;

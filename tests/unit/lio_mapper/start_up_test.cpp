@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "start_up.hpp"
+
+#include "trigpoint/base/so3.hpp"
+
+#include <gtest/gtest.h>
+
+namespace trigpoint::lio_mapper {
+
+namespace {
+
+const Eigen::Vector3d kUp{0.0, 0.0, kStandardGravity_mps2};
+
+ImuBuffer turning(const Eigen::Quaterniond& q_start, const Eigen::Vector3d& rate_radps) {
+  ImuBuffer imu;
+  for (int i = 0; i <= 200; ++i) {
+    const Nanoseconds stamp_ns = i * 5'000'000;
+    const Eigen::Quaterniond q = q_start * so3_exp(rate_radps * to_seconds(stamp_ns));
+    imu.push({stamp_ns, rate_radps, q.conjugate() * kUp});
+  }
+  return imu;
+}
+
+TEST(StartUp, summary_takes_the_turning_out_of_the_specific_force) {
+  const Eigen::Quaterniond q_start = from_roll_pitch_yaw({0.1, -0.2, 0.3});
+  const Eigen::Vector3d rate{0.3, 0.5, 1.0};
+  const ImuBuffer imu = turning(q_start, rate);
+  const ImuSummary summary = summarize(imu, 0, imu.newest_ns());
+  const Eigen::Vector3d expected = (q_start * so3_exp(rate)).conjugate() * kUp;
+  EXPECT_LT((summary.mean_force_mps2 - expected).norm(), 2e-3);
+  EXPECT_LT((summary.mean_gyro_radps - rate).norm(), 1e-9);
+  EXPECT_FALSE(looks_at_rest(summary));
+}
+
+TEST(StartUp, levels_roll_and_pitch_and_begins_with_heading_zero) {
+  const Eigen::Quaterniond q_true = from_roll_pitch_yaw({0.12, -0.08, 2.0});
+  const InitialState initial = level(q_true.conjugate() * kUp, 7, ImuConfig{}, {});
+  const Eigen::Vector3d rpy = roll_pitch_yaw_of(initial.state.T_odom_base.q);
+  EXPECT_NEAR(rpy.x(), 0.12, 1e-9);
+  EXPECT_NEAR(rpy.y(), -0.08, 1e-9);
+  EXPECT_NEAR(rpy.z(), 0.0, 1e-9);
+  EXPECT_EQ(initial.stamp_ns, 7);
+}
+
+/// Monte-Carlo: a biased accelerometer levels wrongly, and covariance must say by how much and that
+/// the error is tied to the bias.
+TEST(StartUp, gravity_and_bias_are_uncertain_together_as_levelling_makes_them) {
+  const ImuConfig imu;
+  const Eigen::Quaterniond q_true = from_roll_pitch_yaw({0.1, -0.2, 0.0});
+  const Eigen::Vector3d bias{0.04, -0.03, 0.0};
+  const InitialState initial = level(q_true.conjugate() * kUp + bias, 0, imu, {});
+  // True gravity as odom sees it: turned from -z by what levelling got wrong.
+  const Eigen::Quaterniond q_odom_true = initial.state.T_odom_base.q * q_true.conjugate();
+  State truth = initial.state;
+  truth.gravity_odom_mps2 = q_odom_true * -kUp;
+  truth.accel_bias_mps2 = bias;
+  const ErrorVector e = boxminus(truth, initial.state);
+  Eigen::Matrix<double, 5, 1> part;
+  part << e.segment<2>(error::kGravity), e.segment<3>(error::kAccelBias);
+  Eigen::Matrix<double, 5, 5> P;
+  P << initial.covariance.block<2, 2>(error::kGravity, error::kGravity),
+      initial.covariance.block<2, 3>(error::kGravity, error::kAccelBias),
+      initial.covariance.block<3, 2>(error::kAccelBias, error::kGravity),
+      initial.covariance.block<3, 3>(error::kAccelBias, error::kAccelBias);
+  EXPECT_GT(part.head<2>().norm(), 4e-3);
+  // One sigma of bias and nothing else: a wrong sign in the cross-covariance would cost
+  // (2 * 5e-3 / 1e-3)^2.
+  EXPECT_LT(part.dot(P.ldlt().solve(part)), 3.0);
+}
+
+TEST(StartUp, says_when_the_accelerometer_speaks_in_g) {
+  const auto event = check_specific_force({0.01, 0.0, 1.0}, 0);
+  ASSERT_TRUE(event.has_value());
+  EXPECT_EQ(event->code, "imu_in_g");
+  EXPECT_NE(event->text.find("9.80665"), std::string::npos);
+}
+
+TEST(StartUp, says_when_the_imu_is_upside_down_or_gravity_was_taken_out) {
+  EXPECT_EQ(check_specific_force(-kUp, 0)->code, "imu_upside_down");
+  EXPECT_EQ(check_specific_force({0.1, 0.1, 0.0}, 0)->code, "imu_force_implausible");
+  EXPECT_FALSE(check_specific_force(kUp, 0).has_value());
+}
+
+}  // namespace
+
+}  // namespace trigpoint::lio_mapper
