@@ -103,6 +103,7 @@ RowHistory::RowHistory(const RowsConfig& config, bool odom_is_fixed)
     : config_(config), odom_is_fixed_(odom_is_fixed) {}
 
 void RowHistory::push(ScanRecord record) {
+  record.state_odom_free = record.before_rows;
   record.state = record.before_rows;
   record.covariance = record.covariance_before_rows;
   records_.push_back(std::move(record));
@@ -160,42 +161,40 @@ RowVerdict RowHistory::apply(const StateUpdate& update) {
   return verdict;
 }
 
-void RowHistory::apply_rows_of(ScanRecord& record, const Pose& T_odom_base_wanted) {
-  record.state = record.before_rows;
+State RowHistory::apply_rows_of(ScanRecord& record) {
+  State state = record.before_rows;
   record.covariance = record.covariance_before_rows;
   for (const StateUpdate& row : record.rows) {
     if (row.mode == UpdateMode::kRows && admits_any(row)) {
       condition_on(row,
-                   predict_row(record.state, record.path, row.fix_stamp_ns, row.lever_arm_base_m),
-                   record.state,
+                   predict_row(state, record.path, row.fix_stamp_ns, row.lever_arm_base_m),
+                   state,
                    record.covariance);
     }
   }
-  if (odom_is_fixed_) {
-    record.state = with_odom_moved(record.state, T_odom_base_wanted);
-  }
+  return state;
 }
 
 void RowHistory::replay_from(std::size_t first) {
-  State previous_old;
-  ErrorMatrix covariance_old;
+  // The change of the state at the scan before, with odom free to move: what a row moved there is
+  // pulled back by the scans after it as far as they could see it, and only the rest is carried
+  // over.
+  ErrorVector change = ErrorVector::Zero();
+  ErrorMatrix covariance_change = ErrorMatrix::Zero();
   for (std::size_t j = first; j < records_.size(); ++j) {
     ScanRecord& record = records_[j];
-    const State old = record.state;
+    const State old = record.state_odom_free;
     const ErrorMatrix old_covariance = record.covariance;
-    if (j > first) {
-      const ScanRecord& previous = records_[j - 1];
-      const ErrorMatrix& M = record.transition;
-      record.before_rows = boxplus(record.before_rows, M * boxminus(previous.state, previous_old));
-      if (odom_is_fixed_) {
-        record.before_rows = with_odom_moved(record.before_rows, old.T_odom_base);
-      }
-      record.covariance_before_rows += M * (previous.covariance - covariance_old) * M.transpose();
-      make_symmetric(record.covariance_before_rows);
-    }
-    apply_rows_of(record, old.T_odom_base);
-    previous_old = old;
-    covariance_old = old_covariance;
+    const ErrorMatrix& M = record.transition;
+    record.before_rows = boxplus(record.before_rows, M * change);
+    record.covariance_before_rows += M * covariance_change * M.transpose();
+    make_symmetric(record.covariance_before_rows);
+    record.state_odom_free = apply_rows_of(record);
+    change = boxminus(record.state_odom_free, old);
+    covariance_change = record.covariance - old_covariance;
+    record.state = odom_is_fixed_
+                       ? with_odom_moved(record.state_odom_free, record.state.T_odom_base)
+                       : record.state_odom_free;
   }
 }
 
@@ -213,6 +212,7 @@ void RowHistory::overwrite(std::size_t anchor, const StateUpdate& update) {
   const Vector3d shift_odom_m = from_yaw(at_fix.state.T_map_odom.yaw_rad).conjugate() * shift_map_m;
   for (std::size_t j = anchor; j < records_.size(); ++j) {
     records_[j].before_rows.T_odom_base.p += shift_odom_m;
+    records_[j].state_odom_free.T_odom_base.p += shift_odom_m;
     records_[j].state.T_odom_base.p += shift_odom_m;
   }
 }
@@ -240,6 +240,7 @@ void RowHistory::align(const Alignment& alignment) {
   };
   for (ScanRecord& record : records_) {
     set(record.before_rows, record.covariance_before_rows);
+    set(record.state_odom_free, record.covariance);
     set(record.state, record.covariance);
   }
 }

@@ -25,7 +25,8 @@ struct ScanRecord {
   /// Error here after the scan's update over the error at the previous scan, update included.
   ErrorMatrix transition{ErrorMatrix::Identity()};
   std::vector<StateUpdate> rows;  ///< whose fixes lie in (previous scan, this one], by stamp
-  State state;                    ///< after the rows
+  State state_odom_free;          ///< after the rows, the pose where they moved it to
+  State state;                    ///< the same with odom moved along, so that the pose stayed
   ErrorMatrix covariance{ErrorMatrix::Identity()};
 };
 
@@ -81,7 +82,8 @@ class RowHistory {
  private:
   RowVerdict check(const StateUpdate& update) const;
   void replay_from(std::size_t first);
-  void apply_rows_of(ScanRecord& record, const Pose& T_odom_base_wanted);
+  /// The state after the record's rows; sets the covariance.
+  static State apply_rows_of(ScanRecord& record);
   void overwrite(std::size_t anchor, const StateUpdate& update);
 
   RowsConfig config_;

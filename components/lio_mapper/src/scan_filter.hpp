@@ -60,6 +60,7 @@ class ScanFilter {
 
   std::vector<StateUpdate> take_covered() { return history_.take_covered(); }
 
+  const RowHistory& history() const { return history_; }
   std::size_t rows_waiting() const { return history_.waiting(); }
 
   /// Of base_link in odom, in ROS order: relative to the local map, plus what odom itself may have

@@ -190,6 +190,40 @@ TEST(LioMapper, learns_where_odom_lies_in_map_from_rows_while_odom_goes_on_as_wi
             0.01);
 }
 
+/// The newest scan after one row, told `delay` scans after the scan that covers its fix.
+ScanResult with_a_row_told_late(const RoomDrive& room, int delay) {
+  Drive drive;
+  drive.drive(room, 0, 30);
+  StateUpdate row;
+  row.fix_stamp_ns = drive.scans.back().odometry.stamp_ns - 30'000'000;
+  row.first_alignment = Alignment{0, {}, Eigen::Matrix4d::Identity()};
+  row.decision.fill(AxisDecision::kLio);
+  drive.take(drive.mapper.on_state_update(row));
+  row.first_alignment.reset();
+  row.decision.fill(AxisDecision::kFused);
+  row.covariance_map_m2 = 0.04 * Eigen::Matrix3d::Identity();
+  row.position_map_m = {0.5, -0.3, 0.2};
+  drive.drive(room, 30, 30 + delay);
+  drive.take(drive.mapper.on_state_update(row));
+  drive.drive(room, 30 + delay, 40);
+  EXPECT_EQ(drive.mapper.status().rows_applied, 1U);
+  return drive.scans.back();
+}
+
+TEST(LioMapper, a_row_told_late_ends_as_the_same_row_told_at_once) {
+  constexpr double kTolerance_m = 1e-3;  // of a row that moves T_map_odom by half a metre
+  const RoomDrive room;
+  const ScanResult at_once = with_a_row_told_late(room, 0);
+  const ScanResult late = with_a_row_told_late(room, 8);
+  EXPECT_GT(at_once.status.T_map_odom.p.norm(), 0.4);
+  EXPECT_LT((at_once.status.T_map_odom.p - late.status.T_map_odom.p).norm(), kTolerance_m);
+  EXPECT_NEAR(at_once.status.T_map_odom.yaw_rad, late.status.T_map_odom.yaw_rad, 1e-3);
+  EXPECT_LT((at_once.status.T_map_odom_covariance - late.status.T_map_odom_covariance).norm(),
+            1e-3 * late.status.T_map_odom_covariance.norm());
+  EXPECT_LT((at_once.odometry.T_frame_child.p - late.odometry.T_frame_child.p).norm(),
+            kTolerance_m);
+}
+
 TEST(LioMapper, refuses_rows_before_it_is_aligned_and_an_alignment_of_another_epoch) {
   const RoomDrive room;
   Drive run;

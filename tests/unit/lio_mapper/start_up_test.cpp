@@ -63,6 +63,7 @@ TEST(StartUp, gravity_and_bias_are_uncertain_together_as_levelling_makes_them) {
       initial.covariance.block<2, 3>(error::kGravity, error::kAccelBias),
       initial.covariance.block<3, 2>(error::kAccelBias, error::kGravity),
       initial.covariance.block<3, 3>(error::kAccelBias, error::kAccelBias);
+  EXPECT_EQ((P - P.transpose()).norm(), 0.0);
   EXPECT_GT(part.head<2>().norm(), 4e-3);
   // One sigma of bias and nothing else: a wrong sign in the cross-covariance would cost
   // (2 * 5e-3 / 1e-3)^2.

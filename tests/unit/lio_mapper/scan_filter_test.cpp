@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "scan_filter.hpp"
+
+#include "room_drive.hpp"
+#include "start_up.hpp"
+#include <gtest/gtest.h>
+
+namespace trigpoint::lio_mapper {
+
+namespace {
+
+using testing_support::RoomDrive;
+
+constexpr Nanoseconds kEpoch_ns = RoomDrive::kEpoch_ns;
+constexpr Nanoseconds kSweep_ns = 100'000'000;
+
+class ScanFilterInAHall : public testing::Test {
+ protected:
+  void SetUp() override {
+    for (int i = 0; i <= 400; ++i) {
+      const ImuSample sample = room.imu_at(kEpoch_ns + i * 5'000'000);
+      imu.push({sample.stamp_ns, sample.gyro_radps, sample.accel_mps2});
+    }
+  }
+
+  std::unique_ptr<ScanFilter> started() const {
+    InitialState initial = level({0.0, 0.0, 9.80665}, kEpoch_ns, Config{}.imu, {});
+    initial.state.gyro_bias_radps = room.gyro_bias_radps;
+    return std::make_unique<ScanFilter>(Config{}, Pose{}, initial);
+  }
+
+  ScanOutcome process(ScanFilter& filter, int sweep) const {
+    SweepDecoder decoder{SweepTimingConfig{}};
+    Events events;
+    const auto decoded = decoder.decode(room.sweep_at(kEpoch_ns + sweep * kSweep_ns), events);
+    return filter.process(std::get<Sweep>(decoded), imu);
+  }
+
+  void drive(ScanFilter& filter, int sweeps) const {
+    for (int i = 0; i < sweeps; ++i) {
+      filter.insert(process(filter, i));
+    }
+  }
+
+  RoomDrive room{0.5};
+  ImuBuffer imu;
+};
+
+/// What late rows rest on: an error before a scan, times the recorded transition, is the error
+/// after its update. Both filters have the same map; one is told that it stands elsewhere.
+TEST_F(ScanFilterInAHall, transition_tells_what_a_scan_leaves_of_an_error) {
+  constexpr double kTolerance = 0.1;  // matches and robust weights differ a little
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto nominal = started();
+    const auto moved = started();
+    drive(*nominal, 10);
+    drive(*moved, 10);
+    const Alignment alignment{0, {}, Eigen::Matrix4d::Identity()};
+    moved->align(alignment);
+    StateUpdate shift;
+    shift.mode = UpdateMode::kOverwrite;
+    shift.fix_stamp_ns = moved->stamp_ns();
+    shift.decision.fill(AxisDecision::kFused);
+    shift.position_map_m = moved->state().T_odom_base.p + 0.01 * Eigen::Vector3d::Unit(axis);
+    ASSERT_EQ(moved->apply(shift).outcome, RowOutcome::kApplied);
+    ErrorVector before = boxminus(moved->state(), nominal->state());
+    before.segment<4>(error::kYawMapOdom).setZero();
+    process(*nominal, 10);
+    process(*moved, 10);
+    ErrorVector after = boxminus(moved->state(), nominal->state());
+    after.segment<4>(error::kYawMapOdom).setZero();
+    const ErrorVector predicted = nominal->history().newest().transition * before;
+    EXPECT_LT((after - predicted).norm(), kTolerance * before.norm()) << "axis " << axis;
+    EXPECT_LT(after.head<3>().norm(), 0.9 * before.norm());  // the scan did pull back
+  }
+}
+
+TEST_F(ScanFilterInAHall, undistortion_ends_at_the_sweeps_end_and_matches_nearly_every_point) {
+  const auto filter = started();
+  drive(*filter, 15);
+  const ScanOutcome outcome = process(*filter, 15);
+  EXPECT_NEAR(to_seconds(filter->stamp_ns() - kEpoch_ns), 1.6, 1e-6);  // float point times
+  EXPECT_TRUE(outcome.used);
+  EXPECT_GT(outcome.share_within_10_cm, 0.7);
+  EXPECT_GT(outcome.observability[0], 0.1);
+}
+
+TEST(Drift, heading_noise_turns_about_the_robot_and_leaves_its_place_in_map) {
+  const Eigen::Vector3d p_odom_m{1000.0, 0.0, 0.0};
+  const Eigen::Matrix4d noise = drift_noise({0.0, 1e-3}, 100.0, 0.4, p_odom_m);
+  // Position in map: yaw moves it by z x R p, translation directly.
+  Eigen::Matrix<double, 3, 4> jacobian;
+  jacobian.col(0) = Eigen::Vector3d::UnitZ().cross(from_yaw(0.4) * p_odom_m);
+  jacobian.rightCols<3>().setIdentity();
+  EXPECT_LT((jacobian * noise * jacobian.transpose()).norm(), 1e-9);
+  EXPECT_NEAR(noise(0, 0), 1e-4, 1e-12);
+}
+
+}  // namespace
+
+}  // namespace trigpoint::lio_mapper
