@@ -11,7 +11,7 @@ Pose interpolate(const Pose& from, const Pose& to, double fraction) {
 }
 
 Pose YawPose::pose() const {
-  return {from_yaw(yaw_rad), p};
+  return {(from_yaw(yaw_rad) * so3_exp({tilt_rad.x(), tilt_rad.y(), 0.0})).normalized(), p};
 }
 
 }  // namespace trigpoint

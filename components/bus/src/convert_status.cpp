@@ -23,11 +23,14 @@ trigpoint_msgs::msg::YawPose to_message(const YawPose& pose) {
   trigpoint_msgs::msg::YawPose message;
   message.yaw_rad(pose.yaw_rad);
   message.position_m(vector_message(pose.p));
+  message.tilt_rad({pose.tilt_rad.x(), pose.tilt_rad.y()});
   return message;
 }
 
 YawPose from_message(const trigpoint_msgs::msg::YawPose& message) {
-  return {message.yaw_rad(), bus::vector_of(message.position_m())};
+  return {message.yaw_rad(),
+          bus::vector_of(message.position_m()),
+          {message.tilt_rad()[0], message.tilt_rad()[1]}};
 }
 
 trigpoint_msgs::msg::ResetInfo to_message(const ResetInfo& reset) {
@@ -175,7 +178,7 @@ LioStatus from_message(const trigpoint_msgs::msg::LioStatus& message) {
   status.reset = from_message(message.reset());
   status.aligned = message.aligned();
   status.T_map_odom = from_message(message.T_map_odom());
-  status.T_map_odom_covariance = from_row_major<4>(message.T_map_odom_covariance());
+  status.T_map_odom_covariance = from_row_major<6>(message.T_map_odom_covariance());
   status.rows_applied = message.rows_applied();
   status.rows_refused = message.rows_refused();
   status.last_refusal = message.last_refusal();

@@ -28,7 +28,8 @@ std::string sigma_text(double yaw_sigma_rad, const std::array<double, 3>& sigma_
 
 std::string transform_text(const YawPose& T) {
   return "yaw " + fixed(T.yaw_rad * kDegrees, 4) + " deg, translation (" + fixed(T.p.x(), 3) +
-         ", " + fixed(T.p.y(), 3) + ", " + fixed(T.p.z(), 3) + ") m";
+         ", " + fixed(T.p.y(), 3) + ", " + fixed(T.p.z(), 3) + ") m, tilt (" +
+         fixed(T.tilt_rad.x() * kDegrees, 3) + ", " + fixed(T.tilt_rad.y() * kDegrees, 3) + ") deg";
 }
 
 /// Nearest rank: the smallest value that at least this share of the sorted values does not exceed.

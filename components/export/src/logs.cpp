@@ -19,7 +19,7 @@ const std::string kGateHeader =
     "e_source,e_sigma_m,e_threshold_m,e_reason,"
     "n_source,n_sigma_m,n_threshold_m,n_reason,"
     "u_source,u_sigma_m,u_threshold_m,u_reason,"
-    "aligned,yaw_rad,x_m,y_m,z_m,yaw_sigma_rad,x_sigma_m,y_sigma_m,z_sigma_m,"
+    "aligned,yaw_rad,x_m,y_m,z_m,tilt_x_rad,tilt_y_rad,yaw_sigma_rad,x_sigma_m,y_sigma_m,z_sigma_m,"
     "fixes_seen,fixes_used,verdicts,gps_source";
 const std::string kGpsHeader =
     "stamp_ns,source,health,datum_id,gnss_class,last_accepted_fix_ns,accepted_x_m,accepted_y_m,"
@@ -108,6 +108,7 @@ void GateLog::append(const FusionStatus& status) {
   }
   line.add(status.aligned).add(status.T_map_odom.yaw_rad);
   line.add(status.T_map_odom.p.x()).add(status.T_map_odom.p.y()).add(status.T_map_odom.p.z());
+  line.add(status.T_map_odom.tilt_rad.x()).add(status.T_map_odom.tilt_rad.y());
   line.add(status.yaw_sigma_rad);
   for (const double sigma_m : status.position_sigma_m) {
     line.add(sigma_m);
@@ -137,6 +138,8 @@ std::vector<FusionStatus> read_gate_log(const std::string& file) {
     for (int axis = 0; axis < 3; ++axis) {
       row.T_map_odom.p[axis] = cells.number();
     }
+    row.T_map_odom.tilt_rad.x() = cells.number();
+    row.T_map_odom.tilt_rad.y() = cells.number();
     row.yaw_sigma_rad = cells.number();
     for (double& sigma_m : row.position_sigma_m) {
       sigma_m = cells.number();

@@ -156,11 +156,14 @@ Datum read_datum(const std::string& file) {
 
 void write_alignment(const std::string& file, const AlignmentRecord& record) {
   const auto& [epoch, T_map_odom, covariance] = record.alignment;
-  std::string text = "# Best known T_map_odom: p_map = Rz(yaw_rad) * p_odom + translation_m\n";
+  std::string text =
+      "# Best known T_map_odom: p_map = Rz(yaw_rad) exp((tilt_rad, 0)) p_odom + translation_m\n";
   text += "odom_epoch: " + std::to_string(epoch);
   text += "\nyaw_rad: " + number_text(T_map_odom.yaw_rad);
   text += "\ntranslation_m: [" + number_text(T_map_odom.p.x()) + ", " +
           number_text(T_map_odom.p.y()) + ", " + number_text(T_map_odom.p.z()) + "]";
+  text += "\ntilt_rad: [" + number_text(T_map_odom.tilt_rad.x()) + ", " +
+          number_text(T_map_odom.tilt_rad.y()) + "]";
   for (int i = 0; i < 4; ++i) {
     text += std::string("\n") + kAlignmentAxes[static_cast<std::size_t>(i)] +
             (i == 0 ? "_sigma_rad: " : "_sigma_m: ") + number_text(std::sqrt(covariance(i, i)));
@@ -178,6 +181,8 @@ AlignmentRecord read_alignment(const std::string& file) {
   result.alignment.T_map_odom.yaw_rad = record.get<double>("yaw_rad");
   const auto p = record.get_list<double>("translation_m", 3);
   result.alignment.T_map_odom.p = {p[0], p[1], p[2]};
+  const auto tilt = record.get_list<double>("tilt_rad", 2);
+  result.alignment.T_map_odom.tilt_rad = {tilt[0], tilt[1]};
   const auto covariance = record.get_list<double>("covariance", 16);
   for (int i = 0; i < 16; ++i) {
     result.alignment.covariance(i / 4, i % 4) = covariance[static_cast<std::size_t>(i)];

@@ -95,7 +95,8 @@ void FusionGate::Impl::make_rows(const AcceptedFix& fix, Output& out) {
 
 std::optional<Alignment> FusionGate::Impl::best_alignment() const {
   if (aligned()) {
-    return Alignment{lio->odom_epoch, lio->T_map_odom, lio->T_map_odom_covariance};
+    return Alignment{
+        lio->odom_epoch, lio->T_map_odom, lio->T_map_odom_covariance.topLeftCorner<4, 4>()};
   }
   if (!window.solution()) {
     return std::nullopt;

@@ -176,6 +176,10 @@ void describe(Config& config, ConfigFields& fields) {
                             config.drift.yaw_sigma_rad_sqrtm,
                             "sigma of yaw after one metre",
                             kNotNegative);
+                   f.number("tilt_sigma_rad_sqrtm",
+                            config.drift.tilt_sigma_rad_sqrtm,
+                            "sigma of roll and of pitch against gravity after one metre",
+                            kNotNegative);
                  });
   fields.section("rows", "GPS rows from the gate", [&](ConfigFields& f) {
     f.number("history_s", config.rows.history_s, "how late a row may come", kPositive);

@@ -14,10 +14,10 @@ namespace trigpoint::lio_mapper {
 
 namespace {
 
-constexpr int kFormatVersion = 2;   // PRAGMA user_version
+constexpr int kFormatVersion = 3;   // PRAGMA user_version
 constexpr int kBusy_ms = 5000;      // one may read while another writes
 constexpr int kPoseNumbers = 7;     // x y z qx qy qz qw
-constexpr int kYawPoseNumbers = 4;  // yaw x y z
+constexpr int kYawPoseNumbers = 6;  // yaw x y z tilt_x tilt_y
 
 constexpr const char* kSchema =
     "CREATE TABLE IF NOT EXISTS keyframes("
@@ -162,7 +162,8 @@ Keyframe keyframe_of(const Statement& row) {
   keyframe.aligned = row.integer(5) != 0;
   std::array<double, kYawPoseNumbers> yaw_pose{};
   row.copy(6, yaw_pose.data(), sizeof yaw_pose);
-  keyframe.T_map_odom = {yaw_pose[0], {yaw_pose[1], yaw_pose[2], yaw_pose[3]}};
+  keyframe.T_map_odom = {
+      yaw_pose[0], {yaw_pose[1], yaw_pose[2], yaw_pose[3]}, {yaw_pose[4], yaw_pose[5]}};
   keyframe.points_base.resize(row.size(7) / sizeof(PointXyzi));
   row.copy(7, keyframe.points_base.data(), keyframe.points_base.size() * sizeof(PointXyzi));
   if (!keyframe.T_odom_base.is_finite() || !keyframe.T_map_odom.pose().is_finite()) {
@@ -215,7 +216,9 @@ void KeyframeWriter::append(const Keyframe& keyframe) {
   const std::array<double, kYawPoseNumbers> yaw_pose{keyframe.T_map_odom.yaw_rad,
                                                      keyframe.T_map_odom.p.x(),
                                                      keyframe.T_map_odom.p.y(),
-                                                     keyframe.T_map_odom.p.z()};
+                                                     keyframe.T_map_odom.p.z(),
+                                                     keyframe.T_map_odom.tilt_rad.x(),
+                                                     keyframe.T_map_odom.tilt_rad.y()};
   Statement& insert = impl_->insert;
   insert.reset();
   insert.bind(1, static_cast<std::int64_t>(keyframe.id));

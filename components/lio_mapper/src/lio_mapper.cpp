@@ -255,10 +255,9 @@ void LioMapper::Impl::refresh_status() {
   }
   status.stamp_ns = filter->stamp_ns();
   status.aligned = filter->aligned();
-  status.T_map_odom = filter->state().T_map_odom;
+  status.T_map_odom = filter->state().placement();
   if (status.aligned) {
-    status.T_map_odom_covariance =
-        filter->covariance().block<4, 4>(error::kYawMapOdom, error::kYawMapOdom);
+    status.T_map_odom_covariance = filter->placement_covariance();
   }
   status.distance_m = filter->distance_m();
   const Matrix6d covariance = filter->pose_covariance_in_local_map();
@@ -275,7 +274,7 @@ Keyframe LioMapper::Impl::make_keyframe(const ScanOutcome& outcome, const Odomet
   keyframe.T_odom_base = odometry.T_frame_child;
   keyframe.pose_covariance = odometry.pose_covariance;
   keyframe.aligned = filter->aligned();
-  keyframe.T_map_odom = filter->state().T_map_odom;
+  keyframe.T_map_odom = filter->state().placement();
   keyframe.points_base = downsample(outcome.points_base, config.keyframes.voxel_m);
   return keyframe;
 }

@@ -84,7 +84,7 @@ RowPrediction predict_row(const State& state,
   const Vector3d lever_base_m = end.T_odom_base.q.conjugate() * (then.q * lever_arm_base_m);
   const Vector3d offset_base_m = displacement_base_m + lever_base_m;
   const Matrix3d R_odom_base = state.T_odom_base.q.toRotationMatrix();
-  const Matrix3d R_map_odom = from_yaw(state.T_map_odom.yaw_rad).toRotationMatrix();
+  const Matrix3d R_map_odom = state.placement().pose().q.toRotationMatrix();
   const Vector3d antenna_odom_m =
       state.T_odom_base.p - age_s * state.v_odom_mps + R_odom_base * offset_base_m;
 
@@ -95,6 +95,7 @@ RowPrediction predict_row(const State& state,
   row.jacobian.middleCols<3>(error::kRotation) = -R_map_odom * R_odom_base * hat(offset_base_m);
   row.jacobian.middleCols<3>(error::kVelocity) = -age_s * R_map_odom;
   row.jacobian.col(error::kYawMapOdom) = Vector3d::UnitZ().cross(R_map_odom * antenna_odom_m);
+  row.jacobian.middleCols<2>(error::kGravity) = placed_point_by_gravity(state, antenna_odom_m);
   row.jacobian.middleCols<3>(error::kPositionMapOdom).setIdentity();
   return row;
 }
@@ -209,7 +210,7 @@ void RowHistory::overwrite(std::size_t anchor, const StateUpdate& update) {
       shift_map_m[axis] = update.position_map_m[axis] - predicted_map_m[axis];
     }
   }
-  const Vector3d shift_odom_m = from_yaw(at_fix.state.T_map_odom.yaw_rad).conjugate() * shift_map_m;
+  const Vector3d shift_odom_m = at_fix.state.placement().pose().q.conjugate() * shift_map_m;
   for (std::size_t j = anchor; j < records_.size(); ++j) {
     records_[j].before_rows.T_odom_base.p += shift_odom_m;
     records_[j].state_odom_free.T_odom_base.p += shift_odom_m;
@@ -231,12 +232,21 @@ std::vector<StateUpdate> RowHistory::take_covered() {
 }
 
 void RowHistory::align(const Alignment& alignment) {
+  // The gate took odom as level. What it found holds where the robot is; the tilt that the gravity
+  // states know turns the rest about that place, and so does their error:
+  // e_t = e_t(gate) - D e_g with D the displacement of the place by the gravity errors.
   constexpr int kAt = error::kYawMapOdom;
+  const Vector3d here_odom_m = newest().state.T_odom_base.p;
   const auto set = [&](State& state, ErrorMatrix& covariance) {
     state.T_map_odom = alignment.T_map_odom;
-    covariance.middleRows<4>(kAt).setZero();
-    covariance.middleCols<4>(kAt).setZero();
-    covariance.block<4, 4>(kAt, kAt) = alignment.covariance;
+    state.T_map_odom.p +=
+        alignment.T_map_odom.pose().q * here_odom_m - state.placement().pose().q * here_odom_m;
+    ErrorMatrix to_aligned = ErrorMatrix::Identity();
+    to_aligned.block<4, 4>(kAt, kAt).setZero();
+    to_aligned.block<3, 2>(error::kPositionMapOdom, error::kGravity) =
+        -placed_point_by_gravity(state, here_odom_m);
+    covariance = (to_aligned * covariance * to_aligned.transpose()).eval();
+    covariance.block<4, 4>(kAt, kAt) += alignment.covariance;
   };
   for (ScanRecord& record : records_) {
     set(record.before_rows, record.covariance_before_rows);

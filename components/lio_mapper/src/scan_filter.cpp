@@ -56,15 +56,32 @@ Eigen::Matrix<double, 6, 4> pose_by_transform(double yaw_rad, const Vector3d& p_
 
 Matrix4d drift_noise(const DriftConfig& drift,
                      double distance_m,
-                     double yaw_rad,
+                     const Matrix3d& R_frame_odom,
                      const Vector3d& p_odom_m) {
   const double position2 = drift.position_sigma_m_sqrtm * drift.position_sigma_m_sqrtm * distance_m;
   const double yaw2 = drift.yaw_sigma_rad_sqrtm * drift.yaw_sigma_rad_sqrtm * distance_m;
   Eigen::Vector4d turn = Eigen::Vector4d::UnitX();
-  turn.tail<3>() = -Vector3d::UnitZ().cross(from_yaw(yaw_rad) * p_odom_m);
+  turn.tail<3>() = -Vector3d::UnitZ().cross(R_frame_odom * p_odom_m);
   Matrix4d noise = yaw2 * turn * turn.transpose();
   noise.bottomRightCorner<3, 3>().diagonal().array() += position2;
   return noise;
+}
+
+void add_drift_noise(const DriftConfig& drift,
+                     double distance_m,
+                     const State& state,
+                     bool aligned,
+                     ErrorMatrix& covariance) {
+  Eigen::Matrix<double, error::kSize, 2> tilt = Eigen::Matrix<double, error::kSize, 2>::Zero();
+  tilt.middleRows<2>(error::kGravity).setIdentity();
+  if (aligned) {
+    const Vector3d& p_odom_m = state.T_odom_base.p;
+    tilt.middleRows<3>(error::kPositionMapOdom) = -placed_point_by_gravity(state, p_odom_m);
+    covariance.block<4, 4>(error::kYawMapOdom, error::kYawMapOdom) +=
+        drift_noise(drift, distance_m, state.placement().pose().q.toRotationMatrix(), p_odom_m);
+  }
+  const double tilt2 = drift.tilt_sigma_rad_sqrtm * drift.tilt_sigma_rad_sqrtm * distance_m;
+  covariance += tilt2 * tilt * tilt.transpose();
 }
 
 ScanFilter::ScanFilter(const Config& config, const Pose& T_base_lidar, const InitialState& initial)
@@ -118,11 +135,8 @@ void ScanFilter::add_drift(Prediction& prediction) {
   }
   distance_m_ += moved_m;
   const Vector3d& p = prediction.state.T_odom_base.p;
-  drift_covariance_ += drift_noise(config_.drift, moved_m, 0.0, p);
-  if (aligned_) {
-    prediction.covariance.block<4, 4>(error::kYawMapOdom, error::kYawMapOdom) +=
-        drift_noise(config_.drift, moved_m, prediction.state.T_map_odom.yaw_rad, p);
-  }
+  drift_covariance_ += drift_noise(config_.drift, moved_m, Matrix3d::Identity(), p);
+  add_drift_noise(config_.drift, moved_m, prediction.state, aligned_, prediction.covariance);
 }
 
 UpdateResult ScanFilter::match(const Prediction& prediction,
@@ -198,6 +212,13 @@ Matrix6d ScanFilter::pose_covariance_in_local_map() const {
   Matrix6d to_odom = Matrix6d::Identity();
   to_odom.bottomRightCorner<3, 3>() = state().T_odom_base.q.toRotationMatrix();
   return to_odom * covariance().topLeftCorner<6, 6>() * to_odom.transpose();
+}
+
+Matrix6d ScanFilter::placement_covariance() const {
+  Eigen::Matrix<double, 6, error::kSize> by_state = Eigen::Matrix<double, 6, error::kSize>::Zero();
+  by_state.block<4, 4>(0, error::kYawMapOdom).setIdentity();
+  by_state.block<2, 2>(4, error::kGravity) = tilt_by_gravity(state().gravity_odom_mps2);
+  return by_state * covariance() * by_state.transpose();
 }
 
 Matrix6d ScanFilter::pose_covariance() const {

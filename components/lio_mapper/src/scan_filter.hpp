@@ -61,6 +61,7 @@ class ScanFilter {
   std::vector<StateUpdate> take_covered() { return history_.take_covered(); }
 
   const RowHistory& history() const { return history_; }
+
   std::size_t rows_waiting() const { return history_.waiting(); }
 
   /// Of base_link in odom, in ROS order: relative to the local map, plus what odom itself may have
@@ -68,6 +69,8 @@ class ScanFilter {
   Matrix6d pose_covariance() const;
   /// Only relative to the local map, in ROS order.
   Matrix6d pose_covariance_in_local_map() const;
+  /// Of T_map_odom: yaw, x, y, z, tilt x, tilt y.
+  Matrix6d placement_covariance() const;
 
   /// Called once between process() and the next process(): rows that wait count before the scan
   /// enters the map.
@@ -99,11 +102,19 @@ class ScanFilter {
 };
 
 /// Covariance that a random walk of heading and position at `p_odom_m` adds to a transform
-/// (yaw, x, y, z) from odom into a frame turned by `yaw_rad`: the heading turns about the robot,
-/// not about the origin of odom.
+/// (yaw, x, y, z) from odom into a frame turned by `R_frame_odom`: the heading turns about the
+/// robot, not about the origin of odom.
 Eigen::Matrix4d drift_noise(const DriftConfig& drift,
                             double distance_m,
-                            double yaw_rad,
+                            const Eigen::Matrix3d& R_frame_odom,
                             const Eigen::Vector3d& p_odom_m);
+
+/// Adds to `covariance` what odom may drift against map over `distance_m`: the noise above and a
+/// tilt, which likewise turns odom about the robot. Before the alignment only the tilt.
+void add_drift_noise(const DriftConfig& drift,
+                     double distance_m,
+                     const State& state,
+                     bool aligned,
+                     ErrorMatrix& covariance);
 
 }  // namespace trigpoint::lio_mapper

@@ -36,6 +36,34 @@ State boxplus(const State& state, const ErrorVector& e) {
   return moved;
 }
 
+YawPose State::placement() const {
+  YawPose placed = T_map_odom;
+  placed.tilt_rad = so3_log(rotation_between(gravity_odom_mps2, -Vector3d::UnitZ())).head<2>();
+  return placed;
+}
+
+Eigen::Matrix2d tilt_by_gravity(const Vector3d& gravity_odom_mps2) {
+  // With u the direction of up in odom, tilt = f(u_z) (u_y, -u_x), f(c) = acos(c) / sqrt(1 - c^2),
+  // and a gravity error e turns u by (B e) x u, B the tangent.
+  const Vector3d u = -gravity_odom_mps2.normalized();
+  const double sine2 = u.head<2>().squaredNorm();
+  const double sine = std::sqrt(sine2);
+  constexpr double kSmall = 1e-4;
+  const double f = sine < kSmall ? 1.0 + sine2 / 6.0 : std::atan2(sine, u.z()) / sine;
+  const double slope = sine < kSmall ? -1.0 / 3.0 : (u.z() * f - 1.0) / sine2;
+  Eigen::Matrix<double, 2, 3> tilt_by_up;
+  tilt_by_up << 0.0, f, slope * u.y(), -f, 0.0, -slope * u.x();
+  return tilt_by_up * -hat(u) * gravity_tangent(gravity_odom_mps2);
+}
+
+Eigen::Matrix<double, 3, 2> placed_point_by_gravity(const State& state, const Vector3d& p_odom_m) {
+  const YawPose placed = state.placement();
+  const Vector3d tilt{placed.tilt_rad.x(), placed.tilt_rad.y(), 0.0};
+  return -(placed.pose().q.toRotationMatrix() * hat(p_odom_m) * so3_right_jacobian(tilt))
+              .leftCols<2>() *
+         tilt_by_gravity(state.gravity_odom_mps2);
+}
+
 ErrorVector boxminus(const State& to, const State& from) {
   ErrorVector e;
   e.segment<3>(error::kPosition) = to.T_odom_base.p - from.T_odom_base.p;
@@ -98,7 +126,7 @@ State with_odom_moved(const State& state, const Pose& T_odom_base_wanted) {
   moved.v_odom_mps = q_new_old * state.v_odom_mps;
   moved.gravity_odom_mps2 = q_new_old * state.gravity_odom_mps2;
   moved.T_map_odom.yaw_rad = wrap_angle(state.T_map_odom.yaw_rad - turn_rad);
-  moved.T_map_odom.p -= from_yaw(moved.T_map_odom.yaw_rad) * p_new_old;
+  moved.T_map_odom.p -= moved.placement().pose().q * p_new_old;
   return moved;
 }
 

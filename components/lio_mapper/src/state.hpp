@@ -37,10 +37,20 @@ struct State {
   Eigen::Vector3d accel_bias_mps2{Eigen::Vector3d::Zero()};
   /// Acceleration of free fall in odom; its magnitude is fixed, its direction estimated.
   Eigen::Vector3d gravity_odom_mps2{0.0, 0.0, -9.80665};
-  YawPose T_map_odom;
+  YawPose T_map_odom;  ///< without tilt: that is in the gravity
 
   bool is_finite() const;
+
+  /// T_map_odom complete: its tilt turns gravity straight down.
+  YawPose placement() const;
 };
+
+/// Columns: by how much the point p_map = placement() * p_odom moves with the two gravity errors.
+Eigen::Matrix<double, 3, 2> placed_point_by_gravity(const State& state,
+                                                    const Eigen::Vector3d& p_odom_m);
+
+/// d tilt / d gravity error.
+Eigen::Matrix2d tilt_by_gravity(const Eigen::Vector3d& gravity_odom_mps2);
 
 /// Unit vectors that span the tangent plane of the sphere at the direction of `gravity`.
 Eigen::Matrix<double, 3, 2> gravity_tangent(const Eigen::Vector3d& gravity);

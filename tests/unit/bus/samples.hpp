@@ -109,8 +109,8 @@ inline LioStatus lio_status() {
   status.sigma = {0.01, 0.02, 0.03, 0.04, 0.05, 0.06};
   status.reset = {4, {0.5, {0.6, 0.7, 0.8}}};
   status.aligned = true;
-  status.T_map_odom = {-1.5, {7.0, 8.0, 9.0}};
-  status.T_map_odom_covariance = counting_matrix<4>(300.0);
+  status.T_map_odom = {-1.5, {7.0, 8.0, 9.0}, {0.01, 0.02}};
+  status.T_map_odom_covariance = counting_matrix<6>(300.0);
   status.rows_applied = 21;
   status.rows_refused = 22;
   status.last_refusal = "row of 10.9 s is older than 1 s";
@@ -218,6 +218,7 @@ inline void expect_equal(const Datum& a, const Datum& b) {
 
 inline void expect_equal(const YawPose& a, const YawPose& b) {
   EXPECT_EQ(a.yaw_rad, b.yaw_rad);
+  EXPECT_EQ(a.tilt_rad, b.tilt_rad);
   EXPECT_EQ(a.p, b.p);
 }
 

@@ -153,7 +153,8 @@ class SimulatedDrive {
     message.aligned = alignment_.has_value();
     if (alignment_) {
       message.T_map_odom = alignment_->T_map_odom;
-      message.T_map_odom_covariance = alignment_->covariance;
+      message.T_map_odom_covariance.setZero();
+      message.T_map_odom_covariance.topLeftCorner<4, 4>() = alignment_->covariance;
     }
     return message;
   }

@@ -138,7 +138,7 @@ Result late(const Chain& chain, const std::vector<StateUpdate>& rows) {
 }
 
 Eigen::Vector3d truth_map_m(const Chain& chain) {
-  return chain.start.T_map_odom.pose() * chain.start.T_odom_base.p;
+  return chain.start.placement().pose() * chain.start.T_odom_base.p;
 }
 
 std::vector<StateUpdate> three_rows(const Chain& chain) {
@@ -245,7 +245,7 @@ TEST(RowPrediction, is_where_the_antenna_was_at_the_fix_when_state_and_path_agre
   state.v_odom_mps = node.v_odom_mps;
   state.T_map_odom = {1.0, {7.0, 8.0, 9.0}};
   const Eigen::Vector3d lever{0.0, 1.0, 2.0};
-  const Eigen::Vector3d expected = state.T_map_odom.pose() * (path.at(30'000'000) * lever);
+  const Eigen::Vector3d expected = state.placement().pose() * (path.at(30'000'000) * lever);
   EXPECT_LT((predict_row(state, path, 30'000'000, lever).position_map_m - expected).norm(), 1e-12);
 }
 
@@ -283,8 +283,8 @@ TEST_F(FixedOdom, carrying_over_keeps_the_posterior_in_map) {
   const Result free = late(chain, {newest});
   history.apply(newest);
   const State& kept = history.newest().state;
-  const Pose a = free.state.T_map_odom.pose() * free.state.T_odom_base;
-  const Pose b = kept.T_map_odom.pose() * kept.T_odom_base;
+  const Pose a = free.state.placement().pose() * free.state.T_odom_base;
+  const Pose b = kept.placement().pose() * kept.T_odom_base;
   EXPECT_LT((a.p - b.p).norm(), 1e-9);
   EXPECT_NEAR(wrap_angle(yaw_of(a.q) - yaw_of(b.q)), 0.0, 1e-9);
 }
@@ -296,12 +296,36 @@ TEST_F(FixedOdom, overwriting_hits_the_value_at_the_fix_and_leaves_covariance_an
   const ScanRecord before = history.newest();
   EXPECT_EQ(history.apply(update).outcome, RowOutcome::kApplied);
   const ScanRecord& at_fix = history.records()[4];
-  const Eigen::Vector3d hit = at_fix.state.T_map_odom.pose() * at_fix.state.T_odom_base.p;
+  const Eigen::Vector3d hit = at_fix.state.placement().pose() * at_fix.state.T_odom_base.p;
   EXPECT_LT((hit.head<2>() - update.position_map_m.head<2>()).norm(), 1e-9);
   EXPECT_NEAR(hit.z(), truth_map_m(chain).z(), 1e-9);
   EXPECT_EQ((history.newest().covariance - before.covariance).norm(), 0.0);
   EXPECT_EQ((history.newest().state.T_map_odom.p - before.state.T_map_odom.p).norm(), 0.0);
   EXPECT_GT((history.newest().state.T_odom_base.p - before.state.T_odom_base.p).norm(), 2.0);
+}
+
+TEST_F(FixedOdom, the_first_alignment_holds_where_the_robot_is_however_odom_is_tilted) {
+  chain.start.gravity_odom_mps2 = so3_exp({0.02, -0.01, 0.0}) * chain.start.gravity_odom_mps2;
+  ErrorMatrix covariance = chain.start_covariance;
+  covariance.block<2, 2>(error::kGravity, error::kGravity).diagonal().array() += 1e-4;
+  ScanRecord tilted = chain.scan(kScans - 1, chain.start, covariance);
+  tilted.stamp_ns += kScan_ns;
+  history.push(tilted);
+  const Alignment alignment{0, {0.3, {20.0, 10.0, 5.0}}, 0.01 * Eigen::Matrix4d::Identity()};
+  history.align(alignment);
+
+  const ScanRecord& newest = history.newest();
+  const Eigen::Vector3d here_odom_m = newest.state.T_odom_base.p;
+  const Eigen::Vector3d here_map_m = newest.state.placement().pose() * here_odom_m;
+  EXPECT_LT((here_map_m - alignment.T_map_odom.pose() * here_odom_m).norm(), 1e-9);
+
+  // The place itself is as uncertain as the gate said: the tilt's error turns about it.
+  auto H =
+      predict_row(newest.state, newest.path, newest.stamp_ns, Eigen::Vector3d::Zero()).jacobian;
+  H.leftCols<error::kGravity>().setZero();  // of the alignment alone
+  const Eigen::Matrix<double, 3, 4> by_alignment = H.rightCols<4>();
+  const Eigen::Matrix3d expected = by_alignment * alignment.covariance * by_alignment.transpose();
+  EXPECT_LT((H * newest.covariance * H.transpose() - expected).norm(), 1e-9);
 }
 
 TEST_F(FixedOdom, refuses_what_cannot_be_used_and_says_why) {

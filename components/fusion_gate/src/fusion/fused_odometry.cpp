@@ -13,26 +13,40 @@ constexpr double kUsableYawVariance_rad2 = 0.1;
 
 }  // namespace
 
-Odometry fuse(const Odometry& lio, const YawPose& T_map_odom, const Eigen::Matrix4d& T_covariance) {
+Odometry fuse(const Odometry& odometry, const YawPose& T_map_odom, const Matrix6d& T_covariance) {
   const Pose T = T_map_odom.pose();
-  Odometry fused = lio;
+  Odometry fused = odometry;
   fused.frame_id = "map";
   fused.child_frame_id = "base_link";
-  fused.T_frame_child = T * lio.T_frame_child;
+  fused.T_frame_child = T * odometry.T_frame_child;
 
   const Eigen::Matrix3d R_map_odom = T.q.toRotationMatrix();
   Matrix6d by_pose = Matrix6d::Zero();
   by_pose.topLeftCorner<3, 3>() = R_map_odom;
   by_pose.bottomRightCorner<3, 3>() = R_map_odom;
 
-  Eigen::Matrix<double, 6, 4> by_transform = Eigen::Matrix<double, 6, 4>::Zero();
-  by_transform.block<3, 1>(0, 0) = Eigen::Vector3d::UnitZ().cross(R_map_odom * lio.T_frame_child.p);
+  const Eigen::Vector3d& p_odom_m = odometry.T_frame_child.p;
+  const Eigen::Vector3d tilt{T_map_odom.tilt_rad.x(), T_map_odom.tilt_rad.y(), 0.0};
+  const Eigen::Matrix3d by_tilt = R_map_odom * so3_right_jacobian(tilt);
+  Matrix6d by_transform = Matrix6d::Zero();
+  by_transform.block<3, 1>(0, 0) = Eigen::Vector3d::UnitZ().cross(R_map_odom * p_odom_m);
   by_transform.block<3, 3>(0, 1) = Eigen::Matrix3d::Identity();
+  by_transform.block<3, 2>(0, 4) =
+      -(R_map_odom * hat(p_odom_m) * so3_right_jacobian(tilt)).leftCols<2>();
   by_transform(5, 0) = 1.0;
+  by_transform.block<3, 2>(3, 4) = by_tilt.leftCols<2>();
 
-  fused.pose_covariance = by_pose * lio.pose_covariance * by_pose.transpose() +
+  fused.pose_covariance = by_pose * odometry.pose_covariance * by_pose.transpose() +
                           by_transform * T_covariance * by_transform.transpose();
   return fused;
+}
+
+Odometry fuse(const Odometry& odometry,
+              const YawPose& T_map_odom,
+              const Eigen::Matrix4d& T_covariance) {
+  Matrix6d with_tilt = Matrix6d::Zero();
+  with_tilt.topLeftCorner<4, 4>() = T_covariance;
+  return fuse(odometry, T_map_odom, with_tilt);
 }
 
 Odometry move_to_base(const Odometry& gps, const Eigen::Vector3d& antenna_position_base_m) {

@@ -89,8 +89,8 @@ struct LioStatus {
   ResetInfo reset;
   bool aligned{false};  ///< T_map_odom holds
   YawPose T_map_odom;
-  /// Order yaw, x, y, z.
-  Eigen::Matrix4d T_map_odom_covariance{Eigen::Matrix4d::Identity() * kUnknownVariance};
+  /// Order yaw, x, y, z, tilt x, tilt y.
+  Matrix6d T_map_odom_covariance{Matrix6d::Identity() * kUnknownVariance};
   std::uint64_t rows_applied{0};
   std::uint64_t rows_refused{0};
   std::string last_refusal;  ///< why, and of which stamp

@@ -29,10 +29,12 @@ struct Pose {
 /// Interpolates at `fraction` in [0, 1]: positions linearly, rotations along the shorter arc.
 Pose interpolate(const Pose& from, const Pose& to, double fraction);
 
-/// A heading-and-translation transform between two level frames, as T_map_odom is.
+/// A transform into a level frame from one that was meant to be level, as T_map_odom is:
+/// R = Rz(yaw) exp((tilt x, tilt y, 0)).
 struct YawPose {
   double yaw_rad{0.0};
-  Eigen::Vector3d p{Eigen::Vector3d::Zero()};  ///< m
+  Eigen::Vector3d p{Eigen::Vector3d::Zero()};         ///< m
+  Eigen::Vector2d tilt_rad{Eigen::Vector2d::Zero()};  ///< turns the source's axes level
 
   Pose pose() const;
 };

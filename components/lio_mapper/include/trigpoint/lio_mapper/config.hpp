@@ -80,6 +80,7 @@ struct LocalMapConfig {
 struct DriftConfig {
   double position_sigma_m_sqrtm{0.02};
   double yaw_sigma_rad_sqrtm{3.5e-4};
+  double tilt_sigma_rad_sqrtm{1e-4};
 };
 
 struct RowsConfig {
