@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -55,6 +56,14 @@ class Cells {
     return value;
   }
 
+  MeasuredStates mask() {
+    const double bits = number();
+    if (bits != std::floor(bits) || bits < 0.0 || bits >= 32768.0) {
+      throw std::runtime_error("not a mask of 15 bits: " + std::to_string(bits));
+    }
+    return MeasuredStates(static_cast<unsigned long>(bits));
+  }
+
   Vector15d vector() {
     Vector15d values;
     for (double& value : values) {
@@ -82,7 +91,7 @@ Case read_case(const std::string& line) {
   Case read;
   read.name = cells.text();
   read.dt_s = cells.number();
-  read.measured = MeasuredStates(std::stoul(cells.text()));
+  read.measured = cells.mask();
   read.x0 = cells.vector();
   read.P0 = cells.matrix();
   read.z = cells.vector();

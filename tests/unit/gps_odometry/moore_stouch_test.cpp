@@ -3,10 +3,13 @@
 // What the published filter does, its defects included: they are why it is not the default.
 #include "moore_stouch.hpp"
 
+#include "measured_states.hpp"
 #include <Eigen/Eigenvalues>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <random>
 
@@ -22,14 +25,6 @@ MooreStouch started() {
   MooreStouch filter;
   filter.initialised = true;
   return filter;
-}
-
-MeasuredStates states(std::initializer_list<int> indices) {
-  MeasuredStates measured;
-  for (const int i : indices) {
-    measured.set(static_cast<std::size_t>(i));
-  }
-  return measured;
 }
 
 StrictOutcome measure(MooreStouch& filter, int state, double value, double variance) {
