@@ -11,7 +11,7 @@ namespace trigpoint::simulator {
 
 namespace {
 
-constexpr int kSeeds = 4000;
+constexpr int kSeeds = 12000;
 
 /// Mean over seeds.
 double mean_of(const std::function<double(std::uint64_t)>& value) {
