@@ -12,8 +12,8 @@
 
 namespace trigpoint::simulator {
 
-/// Lets the faults that are active at a moment act on what the sensors made then. Depends on the
-/// seed and the stamp only, so that asking twice gives the same.
+/// Lets the faults that are active at a moment act on what the sensors made then, in their order in
+/// the list. Depends on the seed and the stamp only, so that asking twice gives the same.
 class FaultSchedule {
  public:
   FaultSchedule(std::vector<std::shared_ptr<Fault>> faults,
@@ -26,6 +26,14 @@ class FaultSchedule {
   void apply(ImuEpoch& epoch) const { run(epoch, epoch.sample.stamp_ns, &Fault::on_imu); }
 
   void apply(SweepEpoch& epoch) const { run(epoch, epoch.stamp_ns, &Fault::on_sweep); }
+
+  double brings_forward_s() const {
+    double sum_s = 0.0;
+    for (const std::shared_ptr<Fault>& fault : faults_) {
+      sum_s += fault->brings_forward_s();
+    }
+    return sum_s;
+  }
 
  private:
   template <typename Epoch>
@@ -41,7 +49,7 @@ class FaultSchedule {
       const std::uint64_t key = derive_seed(seed_, i);
       Random each(derive_seed(key, static_cast<std::uint64_t>(stamp_ns)));
       Random whole(key);
-      (*faults_[i].*hook)(epoch, {since_s, each, whole});
+      (*faults_[i].*hook)(epoch, {since_s, each, whole, key});
     }
   }
 

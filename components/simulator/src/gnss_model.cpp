@@ -60,6 +60,19 @@ const DriverModel& driver_model(const std::string& name) {
 
 constexpr std::uint16_t kGpsAndGlonass = 3;
 
+void write_over(const GnssReport& report, GnssFix& fix) {
+  fix.latitude_deg = report.latitude_deg.value_or(fix.latitude_deg);
+  fix.longitude_deg = report.longitude_deg.value_or(fix.longitude_deg);
+  fix.altitude_m = report.altitude_m.value_or(fix.altitude_m);
+  if (report.variance_enu_m2 && fix.covariance_type != CovarianceType::kUnknown) {
+    fix.covariance_enu_m2 = report.variance_enu_m2->asDiagonal();
+  }
+  if (report.covariance_unknown) {
+    fix.covariance_enu_m2.setZero();
+    fix.covariance_type = CovarianceType::kUnknown;
+  }
+}
+
 }  // namespace
 
 GaussMarkov::GaussMarkov(const Eigen::Vector3d& sigma, double tau_s, Random& random)
@@ -105,6 +118,7 @@ GnssEpoch GnssModel::begin(Nanoseconds stamp_ns, const Eigen::Vector3d& antenna_
   }
   GnssEpoch epoch;
   epoch.stamp_ns = stamp_ns;
+  epoch.period_s = 1.0 / config_.rate_hz;
   epoch.antenna_map_m = antenna_map_m;
   epoch.gnss_class = config_.gnss_class;
   const double jitter_s = random_.uniform(-config_.latency_jitter_s, config_.latency_jitter_s);
@@ -114,14 +128,28 @@ GnssEpoch GnssModel::begin(Nanoseconds stamp_ns, const Eigen::Vector3d& antenna_
 }
 
 GnssFix GnssModel::finish(const GnssEpoch& epoch) {
+  if (!epoch.frozen || !last_) {
+    last_ = measure(epoch);
+  }
+  GnssFix fix = *last_;
+  fix.stamp_ns = epoch.stamp_ns + epoch.stamp_shift_ns;
+  return fix;
+}
+
+GnssFix GnssModel::measure(const GnssEpoch& epoch) const {
   GnssFix fix;
-  fix.stamp_ns = epoch.stamp_ns;
   fix.frame_id = "gnss_antenna";
   fix.service = kGpsAndGlonass;
-  if (epoch.gnss_class == "none") {
-    return fix;  // status no fix, position not a number: it stays at the sensor's border as drivers
-                 // send it
+  // "none": status no fix, position not a number: it stays at the sensor's border as drivers send
+  // it.
+  if (epoch.gnss_class != "none") {
+    solve(epoch, fix);
   }
+  write_over(epoch.report, fix);
+  return fix;
+}
+
+void GnssModel::solve(const GnssEpoch& epoch, GnssFix& fix) const {
   const std::size_t i = class_index(epoch.gnss_class);
   const DriverModel& driver = driver_model(config_.driver);
   const Eigen::Vector3d error =
@@ -134,7 +162,6 @@ GnssFix GnssModel::finish(const GnssEpoch& epoch) {
   fix.altitude_m = place.height_m;
   fix.covariance_enu_m2 = class_models()[i].reported_m.cwiseAbs2().asDiagonal();
   fix.covariance_type = driver.covariance_type;
-  return fix;
 }
 
 }  // namespace trigpoint::simulator

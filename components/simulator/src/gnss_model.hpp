@@ -12,6 +12,7 @@
 #include <Eigen/Core>
 
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -62,11 +63,15 @@ class GnssModel {
   GnssFix finish(const GnssEpoch& epoch);
 
  private:
+  GnssFix measure(const GnssEpoch& epoch) const;
+  void solve(const GnssEpoch& epoch, GnssFix& fix) const;
+
   GnssConfig config_;
   geodesy::LocalFrame frame_;
   Random random_;
   std::vector<GaussMarkov> correlated_;  ///< one a class; all run all the time
   std::vector<Eigen::Vector3d> white_;
+  std::optional<GnssFix> last_;  ///< that was not frozen
 };
 
 }  // namespace trigpoint::simulator

@@ -21,6 +21,19 @@ constexpr std::size_t kHalfWindow =
 
 }  // namespace
 
+double radius_before_rounding_m(double radius_m) {
+  // The mean of n points on a circle, an angle a apart, is nearer to its centre by
+  // sin(n a / 2) / (n sin(a / 2)); the path takes two such means.
+  constexpr auto kPoints = static_cast<double>(2 * kHalfWindow + 1);
+  double before_m = radius_m;
+  for (int i = 0; i < 30; ++i) {
+    const double half_angle = 0.5 * kStep_m / before_m;
+    const double shrink = std::sin(kPoints * half_angle) / (kPoints * std::sin(half_angle));
+    before_m = radius_m / (shrink * shrink);
+  }
+  return before_m;
+}
+
 Path::Path(const std::vector<RoutePoint>& route) {
   sample(route);
   smooth();

@@ -9,6 +9,10 @@
 
 namespace trigpoint::simulator {
 
+/// Radius of the circle in a route that is driven as one of `radius_m` (at least 2 m) once the path
+/// is rounded. The robot is then slower than the route's speed by the same factor.
+double radius_before_rounding_m(double radius_m);
+
 /// A route as a smooth curve over its length: corners rounded by two moving averages, so that the
 /// curvature is continuous; straight on beyond both ends.
 class Path {

@@ -53,6 +53,18 @@ class Random {
     return {x, y, normal()};
   }
 
+  /// Unit vector in any direction of the plane east-north.
+  Eigen::Vector3d level_direction() {
+    const double direction = uniform(0.0, 2.0 * std::numbers::pi);
+    return {std::cos(direction), std::sin(direction), 0.0};
+  }
+
+  /// A vector in any direction of that plane, `lowest` to `highest` long.
+  Eigen::Vector3d level_vector(double lowest, double highest) {
+    const double size = uniform(lowest, highest);
+    return size * level_direction();
+  }
+
   bool chance(double probability) { return uniform() < probability; }
 
  private:

@@ -135,8 +135,11 @@ class Stream final : public ScenarioReader {
   /// Makes the measurement that can arrive first, unless something made already arrives before it.
   bool make_what_may_come_first() {
     const Nanoseconds imu_ns = arrival(imu_epochs_, scenario_.imu.transport_s);
-    const Nanoseconds fix_ns = arrival(
-        fix_epochs_, std::max(0.0, scenario_.gnss.latency_s - scenario_.gnss.latency_jitter_s));
+    const Nanoseconds fix_ns =
+        arrival(fix_epochs_,
+                std::max(0.0,
+                         scenario_.gnss.latency_s - scenario_.gnss.latency_jitter_s -
+                             faults_.brings_forward_s()));
     const Nanoseconds sweep_ns = arrival(sweep_epochs_, sweep_delay_s());
     const Nanoseconds first_ns = std::min({imu_ns, fix_ns, sweep_ns});
     if (first_ns == kNever || (!pending_.empty() && pending_.front().entry.receive_ns < first_ns)) {
@@ -163,12 +166,19 @@ class Stream final : public ScenarioReader {
 
   void make_imu() {
     const Nanoseconds stamp_ns = imu_epochs_.take();
-    ImuEpoch epoch{imu_.measure(ideal_imu(drive_->at(stamp_ns), earth_)), false};
+    ImuEpoch epoch;
+    epoch.sample = imu_.measure(ideal_imu(drive_->at(stamp_ns), earth_));
     epoch.sample.stamp_ns = stamp_ns;
     faults_.apply(epoch);
-    if (!epoch.lost) {
-      push(stamp_ns + from_seconds(scenario_.imu.transport_s), epoch.sample);
+    if (epoch.lost) {
+      return;
     }
+    if (!epoch.frozen || !last_imu_) {
+      last_imu_ = epoch.sample;
+    }
+    ImuSample sample = *last_imu_;
+    sample.stamp_ns = stamp_ns + epoch.stamp_shift_ns;
+    push(stamp_ns + from_seconds(scenario_.imu.transport_s), std::move(sample));
   }
 
   void make_fix() {
@@ -176,8 +186,12 @@ class Stream final : public ScenarioReader {
     const Pose T_map_base = drive_->at(stamp_ns).T_map_base;
     GnssEpoch epoch = gnss_.begin(stamp_ns, T_map_base * scenario_.robot.antenna_position_base_m);
     faults_.apply(epoch);
-    if (!epoch.lost) {
-      push(stamp_ns + from_seconds(epoch.latency_s), gnss_.finish(epoch));
+    if (epoch.lost) {
+      return;
+    }
+    const GnssFix fix = gnss_.finish(epoch);
+    for (int copy = 0; copy <= epoch.copies; ++copy) {
+      push(stamp_ns + from_seconds(epoch.latency_s + copy * epoch.copies_apart_s), fix);
     }
   }
 
@@ -220,7 +234,7 @@ class Stream final : public ScenarioReader {
       GnssEpoch epoch;
       epoch.stamp_ns = epochs.take();
       faults_.apply(epoch);
-      count += epoch.lost ? 0 : 1;
+      count += epoch.lost ? 0U : 1U + static_cast<std::uint64_t>(epoch.copies);
     }
     return count;
   }
@@ -245,6 +259,7 @@ class Stream final : public ScenarioReader {
   SpinningLidar lidar_;
   FaultSchedule faults_;
   std::optional<World> world_;
+  std::optional<ImuSample> last_imu_;  ///< that was not frozen
   Epochs imu_epochs_;
   Epochs fix_epochs_;
   Epochs sweep_epochs_;

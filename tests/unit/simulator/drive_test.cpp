@@ -9,6 +9,8 @@
 #include "scenarios.hpp"
 #include <gtest/gtest.h>
 
+#include <numbers>
+
 namespace trigpoint::simulator {
 
 namespace {
@@ -193,6 +195,33 @@ TEST(Drive, waits_at_a_stop) {
         s.v_map_mps.norm() < 0.02 && std::abs(s.T_map_base.p.x() - 10.0) < 0.2 ? 0.01 : 0.0;
   }
   EXPECT_NEAR(standing_s, 4.0, 0.6);
+}
+
+TEST(Circle, is_driven_at_the_given_radius_and_speed_in_either_direction) {
+  constexpr double kRadius_m = 4.0;
+  constexpr double kSpeed_mps = 2.0;
+  for (const double side : {1.0, -1.0}) {
+    const Scenario scenario = load_scenario_text(
+        "world: {relief_amplitude_m: 0.0}\n"
+        "motion: {vibration_angle_rad: 0.0, vibration_heave_m: 0.0, roll_per_lateral_rad_s2pm: "
+        "0.0}\n"
+        "route: {type: circle, radius_m: 4.0, speed_mps: 2.0, laps: 20, clockwise: " +
+            std::string(side < 0.0 ? "true" : "false") + "}\n",
+        "circle.yaml");
+    const Drive drive(scenario, Relief(scenario.world, 1), 1, 60.0);
+    // The rounding of the entry, from straight on to the circle, moves the centre by millimetres.
+    const Eigen::Vector2d p = drive.at_time(20.0).T_map_base.p.head<2>();
+    const Eigen::Vector2d opposite =
+        drive.at_time(20.0 + std::numbers::pi / (kSpeed_mps / kRadius_m)).T_map_base.p.head<2>();
+    const Eigen::Vector2d centre = 0.5 * (p + opposite);
+    EXPECT_LT((centre - Eigen::Vector2d(0.0, side * kRadius_m)).norm(), 0.2);
+    for (double t_s = 20.0; t_s < 60.0; t_s += 0.37) {
+      const TrueState state = drive.at_time(t_s);
+      EXPECT_NEAR((state.T_map_base.p.head<2>() - centre).norm(), kRadius_m, 2e-3) << t_s;
+      EXPECT_NEAR(state.v_map_mps.norm(), kSpeed_mps, 2e-3) << t_s;
+      EXPECT_NEAR(state.omega_base_radps.z(), side * kSpeed_mps / kRadius_m, 2e-3) << t_s;
+    }
+  }
 }
 
 }  // namespace trigpoint::simulator

@@ -25,7 +25,10 @@ std::string error_of(const std::function<void()>& action) {
 
 TEST(Scenario, loads_every_shipped_file) {
   const std::vector<std::string> names = shipped_scenarios();
-  EXPECT_THAT(names, testing::IsSupersetOf({"campus", "short", "campus_64"}));
+  EXPECT_THAT(
+      names,
+      testing::IsSupersetOf(
+          {"campus", "short", "campus_64", "urban", "open_sky", "open_sky_fast", "circle"}));
   for (const std::string& name : names) {
     EXPECT_EQ(load_scenario(name).name, name);
   }
@@ -52,6 +55,15 @@ TEST(Scenario, refuses_an_unknown_fault_naming_the_known_ones) {
   const std::string error = error_of([] { small_scenario("faults:\n  - {type: gps_outtage}\n"); });
   EXPECT_THAT(error, testing::HasSubstr("small.yaml:9: faults[0].type must be one of"));
   EXPECT_THAT(error, testing::HasSubstr("gps_outage"));
+}
+
+TEST(Scenario, refuses_an_unknown_setting_of_every_fault_with_file_and_line) {
+  for (const auto& [name, make] : fault_registry()) {
+    const std::string error = error_of(
+        [&name = name] { small_scenario("faults:\n  - {type: " + name + ", colour: red}\n"); });
+    EXPECT_THAT(error, testing::HasSubstr("small.yaml:9: faults[0].colour is not a known key"))
+        << name;
+  }
 }
 
 TEST(Scenario, refuses_a_corner_that_nobody_can_drive) {

@@ -3,6 +3,7 @@
 #include "trigpoint/geodesy/local_frame.hpp"
 #include "trigpoint/simulator/simulator.hpp"
 
+#include "entries.hpp"
 #include "scenarios.hpp"
 #include <gtest/gtest.h>
 
@@ -11,57 +12,6 @@
 #include <sstream>
 
 namespace trigpoint::simulator {
-
-namespace {
-
-std::vector<recording::LogEntry> all_of(recording::LogReader& reader) {
-  std::vector<recording::LogEntry> entries;
-  while (auto entry = reader.next()) {
-    entries.push_back(std::move(*entry));
-  }
-  return entries;
-}
-
-std::vector<recording::LogEntry> entries_of(const Scenario& scenario,
-                                            std::uint64_t seed,
-                                            double duration_s,
-                                            bool lidar = true) {
-  return all_of(*open_scenario(scenario, seed, duration_s, {lidar}));
-}
-
-template <typename Message>
-std::vector<Message> messages_of(const std::vector<recording::LogEntry>& entries) {
-  std::vector<Message> messages;
-  for (const recording::LogEntry& entry : entries) {
-    if (const auto* message = std::get_if<Message>(&entry.measurement)) {
-      messages.push_back(*message);
-    }
-  }
-  return messages;
-}
-
-/// Everything that is in the entries, as bytes.
-std::string bytes_of(const std::vector<recording::LogEntry>& entries) {
-  std::ostringstream out;
-  out << std::hexfloat;
-  for (const recording::LogEntry& entry : entries) {
-    out << entry.receive_ns << ' ' << entry.measurement.index() << ' ';
-    if (const auto* imu = std::get_if<ImuSample>(&entry.measurement)) {
-      out << imu->stamp_ns << imu->gyro_radps.transpose() << imu->accel_mps2.transpose();
-    } else if (const auto* fix = std::get_if<GnssFix>(&entry.measurement)) {
-      out << fix->stamp_ns << fix->latitude_deg << fix->longitude_deg << fix->altitude_m;
-    } else if (const auto* cloud = std::get_if<PointCloudMessage>(&entry.measurement)) {
-      out << cloud->stamp_ns << std::string(cloud->data.begin(), cloud->data.end());
-    }
-  }
-  return out.str();
-}
-
-double seconds(const Scenario& scenario, Nanoseconds stamp_ns) {
-  return to_seconds(stamp_ns - scenario.start_ns());
-}
-
-}  // namespace
 
 TEST(Stream, is_bit_identical_for_the_same_seed_and_differs_for_another) {
   const Scenario scenario = small_scenario();

@@ -3,8 +3,6 @@
 #include "faults/gps_bias.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 
 namespace trigpoint::simulator {
 
@@ -17,8 +15,7 @@ void GpsBias::describe(ConfigFields& fields) {
 }
 
 void GpsBias::on_gnss(GnssEpoch& epoch, const FaultMoment& moment) const {
-  const double direction = moment.whole.uniform(0.0, 2.0 * std::numbers::pi);
-  const Eigen::Vector3d drawn(std::cos(direction), std::sin(direction), 0.0);
+  const Eigen::Vector3d drawn = moment.whole.level_direction();
   const double grown = ramp_s_ > 0.0 ? std::min(1.0, moment.since_start_s / ramp_s_) : 1.0;
   epoch.extra_error_m += grown * (offset_enu_m_ + random_horizontal_m_ * drawn);
 }

@@ -6,7 +6,7 @@
 
 namespace trigpoint::simulator {
 
-/// A constant error that the reported covariance does not admit: a wrong integer fix, multipath.
+/// A constant error that the reported covariance does not admit, whatever its cause.
 class GpsBias final : public Fault {
  public:
   void describe(ConfigFields& fields) override;

@@ -6,9 +6,13 @@ namespace trigpoint::simulator {
 
 void GpsOutage::describe(ConfigFields& fields) {
   fields.flag("silent", silent_, "true: no message; false: messages with status no fix");
+  fields.number("share", share_, "of the fixes that are lost", {0.0, 1.0});
 }
 
-void GpsOutage::on_gnss(GnssEpoch& epoch, const FaultMoment&) const {
+void GpsOutage::on_gnss(GnssEpoch& epoch, const FaultMoment& moment) const {
+  if (!moment.each.chance(share_)) {
+    return;
+  }
   epoch.lost = epoch.lost || silent_;
   epoch.gnss_class = "none";
 }

@@ -14,6 +14,7 @@ class GpsOutage final : public Fault {
 
  private:
   bool silent_{true};
+  double share_{1.0};
 };
 
 }  // namespace trigpoint::simulator
