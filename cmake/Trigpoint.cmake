@@ -46,7 +46,9 @@ function(trigpoint_test name)
   endif()
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_LIBS} GTest::gmock GTest::gtest_main)
-  target_compile_options(${name} PRIVATE -O1)  # a test is compiled more often than its time matters
+  # A test is compiled more often than its time matters; at -O1 g++ 12 takes the payload of an empty
+  # std::optional for uninitialised (GCC bug 80635).
+  target_compile_options(${name} PRIVATE -O1 $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
   target_compile_definitions(${name} PRIVATE TRIGPOINT_SHARED_DATA="${TRIGPOINT_SHARED_DATA}" TRIGPOINT_SOURCE_DIR="${PROJECT_SOURCE_DIR}" TRIGPOINT_BIN_DIR="${CMAKE_BINARY_DIR}/bin")
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
   trigpoint_warnings(${name})

@@ -71,57 +71,75 @@ std::string of(std::uint64_t part, std::uint64_t whole, const std::string& strea
   return std::to_string(part) + " of " + std::to_string(whole) + " " + stream + " messages";
 }
 
-/// Sentences about what one program did not get or did not use.
+/// Sentences about messages that went missing, and about those that were refused with a reason.
+struct Findings {
+  std::vector<std::string> losses;
+  std::vector<std::string> refusals;
+};
+
 void find_losses(const ProgramCounts& program,
                  const std::string& stream,
                  std::optional<std::uint64_t> sent,
-                 std::vector<std::string>& losses) {
+                 Findings& findings) {
   const auto counts = counts_of_stream(program, stream);
   const auto in_log = counts.get("in_log");
   const auto put_out = counts.get("published");
   const auto withheld = counts.get("withheld").value_or(0);
   if (in_log && put_out && *put_out + withheld != *in_log) {
-    losses.push_back(program.program + " published " + of(*put_out, *in_log - withheld, stream));
+    findings.losses.push_back(program.program + " published " +
+                              of(*put_out, *in_log - withheld, stream));
   }
   const auto received = counts.get("received");
   if (received && sent && *received != *sent) {
-    losses.push_back(program.program + " received " + of(*received, *sent, stream));
+    findings.losses.push_back(program.program + " received " + of(*received, *sent, stream));
   }
   const auto used = counts.get("used");
-  if (received && used && *used != *received) {
-    const auto reasons = reasons_text(counts);
-    losses.push_back(
-        program.program + " used " + of(*used, *received, stream) +
-        (reasons.empty() ? ", for the rest no reason was counted" : " (refused: " + reasons + ")") +
-        (*used + counts.refused < *received && !reasons.empty()
-             ? ", " + std::to_string(*received - *used - counts.refused) +
-                   " without a counted reason"
-             : ""));
+  if (!received || !used || *used == *received) {
+    return;
+  }
+  const std::string sentence = program.program + " used " + of(*used, *received, stream);
+  if (counts.refused > 0) {
+    findings.refusals.push_back(sentence + " (refused: " + reasons_text(counts) + ")");
+  }
+  if (*used + counts.refused != *received) {
+    findings.losses.push_back(
+        sentence + " and refused " + std::to_string(counts.refused) + ": " +
+        std::to_string(static_cast<std::int64_t>(*received - *used - counts.refused)) +
+        " without a counted reason");
   }
 }
 
+std::string list_of(const std::vector<std::string>& sentences) {
+  std::string text;
+  for (const auto& sentence : sentences) {
+    text += "- " + sentence + "\n";
+  }
+  return text;
+}
+
 std::string conclude(const SessionData& data) {
-  std::vector<std::string> losses;
+  Findings findings;
   bool counted = false;
   for (const auto& stream : kStreams) {
     const auto sent = published(data, stream);
     counted = counted || sent;
     for (const auto& program : data.counts) {
-      find_losses(program, stream, sent, losses);
+      find_losses(program, stream, sent, findings);
     }
   }
   if (!counted) {
     return "\nNobody counted what was published: nothing can be said about losses.\n";
   }
-  if (losses.empty()) {
-    return "\nALL USED: every message of the log was published, received and used (withheld fixes "
-           "apart).\n";
+  if (!findings.losses.empty()) {
+    return "\nNOT ALL ACCOUNTED FOR:\n\n" + list_of(findings.losses) + list_of(findings.refusals);
   }
-  std::string text = "\nNOT ALL USED:\n\n";
-  for (const auto& loss : losses) {
-    text += "- " + loss + "\n";
+  if (!findings.refusals.empty()) {
+    return "\nALL ACCOUNTED FOR: every message of the log was published and received, and used but "
+           "for those refused with a reason (withheld fixes apart):\n\n" +
+           list_of(findings.refusals);
   }
-  return text;
+  return "\nALL USED: every message of the log was published, received and used (withheld fixes "
+         "apart).\n";
 }
 
 }  // namespace

@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 namespace trigpoint::gps_odometry {
 
@@ -70,29 +69,40 @@ void wrap_attitude(Vector15d& x) {
   }
 }
 
-std::vector<int> usable_states(const Vector15d& z, const MeasuredStates& measured) {
-  std::vector<int> states;
+/// Indices of states, on the stack.
+using States = Eigen::Matrix<int, Eigen::Dynamic, 1, 0, 15, 1>;
+
+template <typename Predicate>
+States states_where(const Predicate& holds) {
+  States states(15);
+  Eigen::Index count = 0;
   for (int i = 0; i < 15; ++i) {
-    if (measured[static_cast<std::size_t>(i)] && std::isfinite(z(i))) {
-      states.push_back(i);
+    if (holds(i)) {
+      states[count++] = i;
     }
   }
+  states.conservativeResize(count);
   return states;
 }
 
+States usable_states(const Vector15d& z, const MeasuredStates& measured) {
+  return states_where(
+      [&](int i) { return measured[static_cast<std::size_t>(i)] && std::isfinite(z(i)); });
+}
+
 /// z - x of the measured states, angles the short way round.
-VectorXd innovation_of(const Vector15d& z, const Vector15d& x, const std::vector<int>& states) {
+VectorXd innovation_of(const Vector15d& z, const Vector15d& x, const States& states) {
   VectorXd innovation = z(states) - x(states);
-  for (std::size_t i = 0; i < states.size(); ++i) {
+  for (Eigen::Index i = 0; i < states.size(); ++i) {
     if (states[i] >= kAttitude && states[i] < kAttitude + 3) {
-      auto& angle_rad = innovation(static_cast<Eigen::Index>(i));
+      auto& angle_rad = innovation(i);
       angle_rad = wrap_angle(angle_rad);
     }
   }
   return innovation;
 }
 
-MatrixXd sanitised(const Matrix15d& R, const std::vector<int>& states) {
+MatrixXd sanitised(const Matrix15d& R, const States& states) {
   MatrixXd used = R(states, states);
   used.diagonal() = used.diagonal().unaryExpr([](double variance) {
     // Not std::max: a NaN stays what it is, as published.
@@ -105,12 +115,7 @@ void initialise(MooreStouch& filter,
                 const Vector15d& z,
                 const Matrix15d& R,
                 const MeasuredStates& measured) {
-  std::vector<int> states;
-  for (int i = 0; i < 15; ++i) {
-    if (measured[static_cast<std::size_t>(i)]) {
-      states.push_back(i);
-    }
-  }
+  const States states = states_where([&](int i) { return measured[static_cast<std::size_t>(i)]; });
   filter.x(states) = z(states);
   filter.P(states, states) = R(states, states);
   filter.initialised = true;
@@ -168,8 +173,8 @@ StrictOutcome MooreStouch::correct(const Vector15d& z,
     initialise(*this, z, R, measured);
     return StrictOutcome::kInitialised;
   }
-  const std::vector<int> states = usable_states(z, measured);
-  if (states.empty()) {
+  const States states = usable_states(z, measured);
+  if (states.size() == 0) {
     return StrictOutcome::kNothingMeasured;
   }
   const MatrixXd R_used = sanitised(R, states);

@@ -181,10 +181,25 @@ TEST(Report, names_every_loss_of_messages) {
               {"points.refused.no_imu", 3},
               {"imu.received", 24000}});
   EXPECT_THAT(write_report(folder.path(), kNoPictures).text,
-              AllOf(HasSubstr("NOT ALL USED"),
+              AllOf(HasSubstr("NOT ALL ACCOUNTED FOR"),
                     HasSubstr("lio_mapper received 1199 of 1201 points messages"),
-                    HasSubstr("lio_mapper used 1195 of 1199 points messages (refused: no_imu 3), "
-                              "1 without a counted reason")));
+                    HasSubstr("lio_mapper used 1195 of 1199 points messages (refused: no_imu 3)"),
+                    HasSubstr("1195 of 1199 points messages and refused 3: 1 without a counted "
+                              "reason")));
+}
+
+TEST(Report, tells_refusals_with_a_reason_from_losses) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  exporter::CountsWriter(folder.path(), "lio_mapper")
+      .write({{"points.received", 1201},
+              {"points.used", 1198},
+              {"points.refused.no_imu", 3},
+              {"imu.received", 24000}});
+  EXPECT_THAT(write_report(folder.path(), kNoPictures).text,
+              AllOf(HasSubstr("\nALL ACCOUNTED FOR"),
+                    HasSubstr("lio_mapper used 1198 of 1201 points messages (refused: no_imu 3)"),
+                    testing::Not(HasSubstr("NOT ALL"))));
 }
 
 TEST(Report, goes_on_with_the_rest_when_a_file_is_damaged_or_missing) {
