@@ -320,8 +320,8 @@ TEST_F(FixedOdom, the_first_alignment_holds_where_the_robot_is_however_odom_is_t
   EXPECT_LT((here_map_m - alignment.T_map_odom.pose() * here_odom_m).norm(), 1e-9);
 
   // The place itself is as uncertain as the gate said: the tilt's error turns about it.
-  auto H =
-      predict_row(newest.state, newest.path, newest.stamp_ns, Eigen::Vector3d::Zero()).jacobian;
+  const Nanoseconds end_ns = newest.path.back().stamp_ns;
+  auto H = predict_row(newest.state, newest.path, end_ns, Eigen::Vector3d::Zero()).jacobian;
   H.leftCols<error::kGravity>().setZero();  // of the alignment alone
   const Eigen::Matrix<double, 3, 4> by_alignment = H.rightCols<4>();
   const Eigen::Matrix3d expected = by_alignment * alignment.covariance * by_alignment.transpose();
