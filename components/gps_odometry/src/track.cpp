@@ -25,11 +25,10 @@ constexpr double kLongGap_s = 1.0;     // IMU gap after which attitude and veloc
 constexpr double kRestartGap_s = 5.0;  // IMU gap after which nothing is left
 constexpr double kTeleportMargin_m = 5.0;
 constexpr double kAligningSpeedSigma_mps = 1.0;
-constexpr int kRecoveryFixes = 4;
-constexpr double kRecoveryGap_s = 5.0;  // refused fixes further apart are not one streak
 constexpr double kGyroBiasGrowth = 3.3;
 constexpr double kAccelBiasGrowth = 3.0;
 constexpr double kIgnoredHeight_m2 = 1e8;
+constexpr double kSteep_rad = 1.4;  // roll pitch yaw become singular at pitch 90 degrees
 
 }  // namespace
 
@@ -228,7 +227,8 @@ FixOutcome Tracker::filter_fix(Track& track, const MapFix& fix) const {
     R.row(2).setZero();
     R.col(2).setZero();
     R(2, 2) = kIgnoredHeight_m2;
-    if (extend(track.refused_height, fix)) {
+    extend(track.refused_height, fix, config_.highest_speed_mps);
+    if (is_believed(track.refused_height, config_.recovery_s)) {
       recover_height(track, fix);
     }
   } else {
@@ -239,31 +239,12 @@ FixOutcome Tracker::filter_fix(Track& track, const MapFix& fix) const {
   return outcome;
 }
 
-bool Tracker::agrees(const RefusedStreak& streak, const MapFix& fix) const {
-  const double elapsed_s = to_seconds(fix.checked.stamp_ns - streak.last_ns);
-  const double sigma = std::sqrt(fix.covariance_map_m2.diagonal().maxCoeff());
-  const double step = (fix.antenna_map_m - streak.last_map_m).norm();
-  return elapsed_s >= 0.0 && elapsed_s < kRecoveryGap_s &&
-         step < config_.highest_speed_mps * elapsed_s + 5.0 * sigma;
-}
-
-/// True when the streak is long enough to be believed.
-bool Tracker::extend(RefusedStreak& streak, const MapFix& fix) const {
-  if (streak.count == 0 || !agrees(streak, fix)) {
-    streak = RefusedStreak{0, fix.checked.stamp_ns, 0, Vector3d::Zero()};
-  }
-  ++streak.count;
-  streak.last_ns = fix.checked.stamp_ns;
-  streak.last_map_m = fix.antenna_map_m;
-  return streak.count >= kRecoveryFixes &&
-         to_seconds(streak.last_ns - streak.first_ns) >= config_.recovery_s;
-}
-
 FixOutcome Tracker::refuse(Track& track,
                            const MapFix& fix,
                            const std::string& reason,
                            const std::string& text) const {
-  if (extend(track.refused, fix)) {
+  extend(track.refused, fix, config_.highest_speed_mps);
+  if (is_believed(track.refused, config_.recovery_s)) {
     recover(track, fix);
     return {true,
             "recovered",
@@ -331,16 +312,7 @@ void Tracker::accept(Track& track, const MapFix& fix) const {
   const double elapsed_s =
       track.accepted_ns > 0 ? to_seconds(fix.checked.stamp_ns - track.accepted_ns) : 0.0;
   hold_correlated(track, fix, elapsed_s);
-  if (elapsed_s > 0.0) {
-    const double interval = std::min(elapsed_s, 2.0);
-    track.fix_interval_s =
-        track.fix_interval_s == 0.0 ? interval : 0.8 * track.fix_interval_s + 0.2 * interval;
-  }
-  ++track.accepted;
-  track.refused = RefusedStreak{};
-  track.accepted_ns = fix.checked.stamp_ns;
-  track.gnss_class = fix.checked.gnss_class;
-  track.assumed_covariance = fix.checked.assumed_covariance;
+  note_accepted(track, fix);
   if (track.phase == Phase::kRunning) {
     const auto H = antenna_jacobian(track.filter.x, lever_base_m_);
     track.accepted_antenna_map_m = expected_antenna(track.filter.x, lever_base_m_);
@@ -349,16 +321,11 @@ void Tracker::accept(Track& track, const MapFix& fix) const {
     track.accepted_antenna_map_m = fix.antenna_map_m;
     track.accepted_covariance_map_m2 = fix.covariance_map_m2;
   }
-  track.accepted_covariance_map_m2.diagonal() += track.correlated_m2 + floor_variance_m2(track);
+  track.accepted_covariance_map_m2.diagonal() +=
+      track.correlated_m2 + floor_variance_m2(track, config_);
 }
 
 // ---- what is published --------------------------------------------------------------------------
-
-Vector3d Tracker::floor_variance_m2(const Track& track) const {
-  const double sigma = track.gnss_class == GnssClass::kFixed ? config_.floor_sigma_fixed_m
-                                                             : config_.floor_sigma_other_m;
-  return Vector3d(sigma, sigma, 2.0 * sigma).cwiseAbs2();
-}
 
 Pose Tracker::pose(const Track& track) const {
   const Vector3d rpy = track.filter.x.segment<3>(kAttitude);
@@ -378,7 +345,7 @@ PoseCovariance Tracker::pose_covariance(const Track& track) const {
   J.bottomRightCorner<3, 3>() = track.filter.R_map_base() * body_from_euler_rates(rpy);
   PoseCovariance covariance = J * track.filter.P.topLeftCorner<6, 6>() * J.transpose();
   if (track.phase == Phase::kRunning) {
-    covariance.diagonal().head<3>() += track.correlated_m2 + floor_variance_m2(track);
+    covariance.diagonal().head<3>() += track.correlated_m2 + floor_variance_m2(track, config_);
     return 0.5 * (covariance + covariance.transpose());
   }
   PoseCovariance aligning = PoseCovariance::Zero();
@@ -403,6 +370,24 @@ double Tracker::yaw_sigma_rad(const Track& track) const {
   return track.phase == Phase::kRunning
              ? std::sqrt(std::max(0.0, track.filter.P(kAttitude + 2, kAttitude + 2)))
              : kUnknownYaw_rad;
+}
+
+Estimate Tracker::estimate(const Track& track) const {
+  Estimate estimate;
+  estimate.T_map_base = pose(track);
+  estimate.pose_covariance = pose_covariance(track);
+  estimate.angular_base_radps = track.filter.x.segment<3>(kRate);
+  estimate.twist_covariance = twist_covariance(track);
+  if (track.phase == Phase::kRunning) {
+    estimate.linear_base_mps = track.filter.x.segment<3>(kVelocity);
+  } else {
+    forget_velocity(estimate);
+  }
+  return estimate;
+}
+
+bool Tracker::is_doubtful(const Track& track) const {
+  return std::abs(track.filter.x(kAttitude + 1)) > kSteep_rad;
 }
 
 void Tracker::change_frame(Track& track,
