@@ -4,9 +4,9 @@
 
 #include "trigpoint/base/config.hpp"
 
+#include "ekf_tracker.hpp"
 #include "ins_tracker.hpp"
 #include "rewind.hpp"
-#include "track.hpp"
 
 namespace trigpoint::gps_odometry {
 
@@ -45,7 +45,7 @@ class BufferedFilter : public Filter {
 
   void announce_reset(const YawPose& delta) override { buffer_.announce_reset(delta); }
 
-  const TrackState& newest() const override { return buffer_.newest(); }
+  const Track& newest() const override { return buffer_.newest(); }
 
   Estimate estimate() const override { return tracker_.estimate(buffer_.newest()); }
 
@@ -63,8 +63,8 @@ class BufferedFilter : public Filter {
 }  // namespace
 
 std::unique_ptr<Filter> make_filter(const Config& config, const RobotConfig& robot) {
-  if (config.filter == Tracker::kSource) {
-    return std::make_unique<BufferedFilter<Tracker>>(config, robot);
+  if (config.filter == EkfTracker::kSource) {
+    return std::make_unique<BufferedFilter<EkfTracker>>(config, robot);
   }
   if (config.filter == InsTracker::kSource) {
     return std::make_unique<BufferedFilter<InsTracker>>(config, robot);

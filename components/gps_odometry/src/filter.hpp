@@ -8,7 +8,7 @@
 #include "trigpoint/gps_odometry/config.hpp"
 
 #include "imu_checks.hpp"
-#include "track_state.hpp"
+#include "track.hpp"
 
 #include <memory>
 #include <optional>
@@ -36,7 +36,7 @@ class Filter {
   virtual void announce_reset(const YawPose& delta) = 0;
 
   // Of the newest state.
-  virtual const TrackState& newest() const = 0;
+  virtual const Track& newest() const = 0;
   virtual Estimate estimate() const = 0;
   virtual double speed_mps() const = 0;
   virtual double yaw_sigma_rad() const = 0;

@@ -269,7 +269,7 @@ Odometry GpsOdometry::Impl::odometry() const {
 }
 
 void GpsOdometry::Impl::publish_odometry(Output& output) {
-  const TrackState& track = filter->newest();
+  const Track& track = filter->newest();
   if (!datum || track.phase == Phase::kNoImu || track.accepted_ns == 0) {
     return;
   }
@@ -296,7 +296,7 @@ Surroundings GpsOdometry::Impl::around() const {
 }
 
 GpsStatus GpsOdometry::Impl::status() const {
-  const TrackState& track = filter->newest();
+  const Track& track = filter->newest();
   GpsStatus status;
   status.stamp_ns = now_ns;
   status.source = filter->source();

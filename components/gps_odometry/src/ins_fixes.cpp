@@ -24,6 +24,7 @@ constexpr double kOtherReceiver = 2.0;   // ratio of variances that means anothe
 constexpr double kDecided = 12.0;        // log of the likelihood ratio
 constexpr double kTurnRound = 4.0;       // the same, to exchange filter and rival
 constexpr double kWorstFit = 25.0;       // a bad fix speaks for neither heading
+constexpr double kWrongFix_m = 1.0;      // wrong ambiguities, 1 sigma (research/gps C7)
 constexpr double kReadmission_m = 10.0;  // step after an outage that is remembered
 constexpr double kLostSpeed_mps = 2.0;   // doubts after the position had to be set
 constexpr double kLostYaw_rad = 0.5;
@@ -196,6 +197,12 @@ void InsTracker::follow_receiver(InsTrack& track, const MapFix& fix) const {
   const double keep =
       std::exp(-std::clamp(elapsed_s, 0.0, 60.0) / config_.eskf18.better_class_decay_s);
   track.held_variance_m2 = now.cwiseMax(keep * track.held_variance_m2 + (1.0 - keep) * now);
+  if (elapsed_s > config_.eskf18.suspect_outage_s && track.phase == Phase::kRunning) {
+    // A new solution after an outage: no better than the dead reckoning until it has proven itself.
+    const Vector3d known_m2 = track.filter.P.diagonal().segment<3>(ins::kPosition);
+    track.held_variance_m2 =
+        track.held_variance_m2.cwiseMax(known_m2.cwiseMin(kWrongFix_m * kWrongFix_m));
+  }
   if (other && track.phase == Phase::kRunning) {
     for (const Part part : kParts) {
       for_each(track, [&](Eskf18& filter) { renew_fix_error(filter, fix, part); });
@@ -322,8 +329,14 @@ bool InsTracker::resolve(InsTrack& track,
     if (judge(fresh, fix).ratio[part] <= 1.0) {
       for_each(track, [&](Eskf18& filter) { renew_fix_error(filter, fix, part); });
       contradiction = Contradiction{};
+      // Back where the filter is: it was right.
+      const auto [first, count] = kSpans[part];
+      track.doubt_m.segment(first, count).setZero();
       return true;
     }
+  }
+  if (was_unproven(track, fix, part, judgement)) {
+    return true;
   }
   extend(contradiction.streak, fix, config_.highest_speed_mps);
   if (contradiction.streak.count == 1) {
@@ -343,6 +356,26 @@ bool InsTracker::resolve(InsTrack& track,
     return true;
   }
   return false;
+}
+
+/// Where the position still rests on a solution that is not proven (peak hold), a step within that
+/// variance is a correction.
+bool InsTracker::was_unproven(InsTrack& track,
+                              const MapFix& fix,
+                              Part part,
+                              const Judgement& judgement) const {
+  const Vector3d held_m2 = (track.held_variance_m2 - track.fix_variance_m2).cwiseMax(0.0);
+  const Matrix3d S = judgement.S_m2() + Matrix3d(held_m2.asDiagonal());
+  if (distance2(judgement.innovation_m, S, part) > gate_[part]) {
+    return false;
+  }
+  const auto [first, count] = kSpans[part];
+  for_each(track, [&](Eskf18& filter) {
+    for (int i = first; i < first + count; ++i) {
+      filter.P(ins::kPosition + i, ins::kPosition + i) += held_m2(i);
+    }
+  });
+  return judge(track.filter, fix).ratio[part] <= 1.0;
 }
 
 /// The receiver has jumped: its error state takes the difference, the position stays.

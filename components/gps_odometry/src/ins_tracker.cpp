@@ -28,7 +28,7 @@ constexpr double kSaturatedGyro_radps_sqrthz = 0.3;  // some rad/s and g for a h
 constexpr double kSaturatedAccel_mps2_sqrthz = 5.0;
 constexpr double kNearLimit = 0.98;
 constexpr double kLevelSigma_mps2 = 2.0;  // manoeuvres while nothing but gravity levels
-constexpr double kSlowDecay = 10.0;       // an absorbed jump decays slower than the class's error
+constexpr double kSlowDecay = 1e6;        // an absorbed jump stays
 // Rest, research/gps C5; each is widened by what the filter knows.
 constexpr double kRestRate_radps = 0.01;
 constexpr double kRestForce_mps2 = 0.3;

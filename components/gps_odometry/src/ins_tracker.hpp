@@ -7,7 +7,7 @@
 #include "eskf18.hpp"
 #include "heading.hpp"
 #include "imu_checks.hpp"
-#include "track_state.hpp"
+#include "track.hpp"
 #include <Eigen/Core>
 
 #include <array>
@@ -25,7 +25,7 @@ struct Contradiction {
   Nanoseconds absorbed_ns{0};  ///< since when the error state holds a jump of the receiver; 0: no
 };
 
-struct InsTrack : TrackState {
+struct InsTrack : Track {
   Eskf18 filter;
   ImuMean imu;  ///< the newest sample
   bool imu_saturated{false};
@@ -99,6 +99,10 @@ class InsTracker {
   Judgement judge(const Eskf18& filter, const MapFix& fix) const;
   FixOutcome filter_fix(InsTrack& track, const MapFix& fix) const;
   bool resolve(InsTrack& track, const MapFix& fix, Part part, const Judgement& judgement) const;
+  bool was_unproven(InsTrack& track,
+                    const MapFix& fix,
+                    Part part,
+                    const Judgement& judgement) const;
   void absorb(InsTrack& track, const MapFix& fix, Part part, const Judgement& judgement) const;
   void recover(InsTrack& track, const MapFix& fix, Part part) const;
   void end_absorptions(InsTrack& track, const MapFix& fix) const;

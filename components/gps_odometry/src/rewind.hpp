@@ -2,11 +2,11 @@
 // Copyright the Trigpoint developers
 // Late measurements at their own stamps: the last second of measurements with the Track after each.
 // A late one is put in its place and everything after it is done again, so that the result is that
-// of sorted input. Any filter's tracker fits that has a plain `State` derived from TrackState.
+// of sorted input. Any filter's tracker fits that has a plain `State` derived from Track.
 #pragma once
 
 #include "imu_checks.hpp"
-#include "track_state.hpp"
+#include "track.hpp"
 
 #include <algorithm>
 #include <deque>
@@ -19,7 +19,7 @@ namespace trigpoint::gps_odometry {
 template <typename TrackerType>
 class RewindBuffer {
  public:
-  using Track = typename TrackerType::State;
+  using State = typename TrackerType::State;
 
   RewindBuffer(const TrackerType& tracker, Nanoseconds length_ns);
 
@@ -33,7 +33,7 @@ class RewindBuffer {
   bool has_fix_at(Nanoseconds stamp_ns) const;
 
   /// The newest state.
-  const Track& newest() const { return entries_.empty() ? before_ : entries_.back().after; }
+  const State& newest() const { return entries_.empty() ? before_ : entries_.back().after; }
 
   std::optional<Nanoseconds> newest_imu_ns() const { return newest_imu_ns_; }
 
@@ -51,16 +51,16 @@ class RewindBuffer {
   struct Entry {
     Nanoseconds stamp_ns{0};
     Measurement measurement;
-    Track after;
+    State after;
   };
 
   FixOutcome insert(Nanoseconds stamp_ns, const Measurement& measurement);
-  FixOutcome apply(Entry& entry, const Track& before) const;
+  FixOutcome apply(Entry& entry, const State& before) const;
   void forget_old();
 
   const TrackerType& tracker_;
   Nanoseconds length_ns_;
-  Track before_;  ///< the state before the oldest entry
+  State before_;  ///< the state before the oldest entry
   std::deque<Entry> entries_;
   std::optional<Nanoseconds> newest_imu_ns_;
 };
@@ -94,8 +94,8 @@ FixOutcome RewindBuffer<TrackerType>::insert(Nanoseconds stamp_ns, const Measure
   while (place != entries_.begin() && !is_before(*std::prev(place))) {
     --place;
   }
-  place = entries_.insert(place, Entry{stamp_ns, measurement, Track{}});
-  const auto before = [&](auto it) -> const Track& {
+  place = entries_.insert(place, Entry{stamp_ns, measurement, State{}});
+  const auto before = [&](auto it) -> const State& {
     return it == entries_.begin() ? before_ : std::prev(it)->after;
   };
   const FixOutcome outcome = apply(*place, before(place));
@@ -106,7 +106,7 @@ FixOutcome RewindBuffer<TrackerType>::insert(Nanoseconds stamp_ns, const Measure
 }
 
 template <typename TrackerType>
-FixOutcome RewindBuffer<TrackerType>::apply(Entry& entry, const Track& before) const {
+FixOutcome RewindBuffer<TrackerType>::apply(Entry& entry, const State& before) const {
   entry.after = before;
   FixOutcome outcome;
   if (const auto* imu = std::get_if<CheckedImu>(&entry.measurement)) {
@@ -148,7 +148,7 @@ void RewindBuffer<TrackerType>::forget_old() {
 
 template <typename TrackerType>
 void RewindBuffer<TrackerType>::restart() {
-  Track fresh = newest();
+  State fresh = newest();
   fresh.phase = Phase::kNoImu;
   fresh.stamp_ns = fresh.imu_ns = fresh.accepted_ns = fresh.refused_ns = fresh.reset_ns = 0;
   fresh.refused = fresh.refused_height = RefusedStreak{};
@@ -174,7 +174,7 @@ void RewindBuffer<TrackerType>::change_frame(const Eigen::Matrix3d& R_new_old,
 
 template <typename TrackerType>
 void RewindBuffer<TrackerType>::announce_reset(const YawPose& delta) {
-  const auto announce = [&](Track& track) {
+  const auto announce = [&](State& track) {
     ++track.reset.counter;
     track.reset.delta = delta;
     track.reset_ns = track.stamp_ns;

@@ -18,11 +18,11 @@ bool is_recent(Nanoseconds stamp_ns, Nanoseconds now_ns) {
 
 }  // namespace
 
-double dead_reckoning_age_s(const TrackState& track, const Config& config) {
+double dead_reckoning_age_s(const Track& track, const Config& config) {
   return std::max(config.dead_reckoning_after_s, kIntervals * track.fix_interval_s);
 }
 
-GpsHealth health_of(const TrackState& track,
+GpsHealth health_of(const Track& track,
                     double yaw_sigma_rad,
                     const Surroundings& around,
                     const Config& config) {
@@ -47,7 +47,7 @@ GpsHealth health_of(const TrackState& track,
   return GpsHealth::kOk;
 }
 
-std::vector<NamedCount> rejections_of(const TrackState& track, const Counters& messages) {
+std::vector<NamedCount> rejections_of(const Track& track, const Counters& messages) {
   std::vector<NamedCount> counts = messages.list();
   const auto add = [&](const char* name, std::uint64_t count) {
     if (count > 0) {

@@ -6,7 +6,7 @@
 #include "trigpoint/gps_odometry/config.hpp"
 
 #include "counters.hpp"
-#include "track_state.hpp"
+#include "track.hpp"
 
 namespace trigpoint::gps_odometry {
 
@@ -19,16 +19,16 @@ struct Surroundings {
   bool filter_doubts{false};  ///< the filter has a reason of its own
 };
 
-GpsHealth health_of(const TrackState& track,
+GpsHealth health_of(const Track& track,
                     double yaw_sigma_rad,
                     const Surroundings& around,
                     const Config& config);
 
 /// Age of the last accepted fix above which the filter counts as dead reckoning: the configured
 /// one, or two and a half intervals of a slow receiver.
-double dead_reckoning_age_s(const TrackState& track, const Config& config);
+double dead_reckoning_age_s(const Track& track, const Config& config);
 
 /// Refusals by reason: those of single messages and those that the Track decided.
-std::vector<NamedCount> rejections_of(const TrackState& track, const Counters& messages);
+std::vector<NamedCount> rejections_of(const Track& track, const Counters& messages);
 
 }  // namespace trigpoint::gps_odometry

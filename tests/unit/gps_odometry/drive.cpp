@@ -252,8 +252,9 @@ std::uint64_t count_of(const GpsStatus& status, const std::string& reason) {
   return 0;
 }
 
-Config config_with_datum() {
+Config config_with_datum(const std::string& filter) {
   Config config;
+  config.filter = filter;
   config.use_configured_datum = true;
   config.datum_latitude_deg = test_datum().latitude_deg;
   config.datum_longitude_deg = test_datum().longitude_deg;

@@ -10,6 +10,7 @@
 
 #include <functional>
 #include <random>
+#include <string>
 #include <vector>
 
 namespace trigpoint::gps_odometry {
@@ -117,6 +118,6 @@ double rms_m(const std::vector<Sample>& samples, double from_s, double to_s = 1e
 std::uint64_t count_of(const GpsStatus& status, const std::string& reason);
 
 /// Defaults with the test's datum.
-Config config_with_datum();
+Config config_with_datum(const std::string& filter = "ekf15");
 
 }  // namespace trigpoint::gps_odometry

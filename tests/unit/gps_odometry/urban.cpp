@@ -22,10 +22,15 @@ struct Kind {
   double longest_s;
 };
 
-const Kind kFixedKind{
-    FixStatus::kGbas, {0.008, 0.008, 0.015}, 100.0, {0.010, 0.010, 0.018}, 0.014, 20.0, 60.0};
-const Kind kFloatKind{
-    FixStatus::kGbas, {0.35, 0.35, 0.6}, 40.0, {0.07, 0.07, 0.1}, 0.3, 10.0, 25.0};
+const Kind kFixedKind{FixStatus::kGbas,
+                      {0.008, 0.008, 0.015},
+                      100.0,
+                      {0.010, 0.010, 0.018},
+                      0.014,
+                      20.0,
+                      60.0};
+const Kind
+    kFloatKind{FixStatus::kGbas, {0.35, 0.35, 0.6}, 40.0, {0.07, 0.07, 0.1}, 0.3, 10.0, 25.0};
 const Kind kCodeKind{FixStatus::kSbas, {1.5, 1.5, 3.0}, 60.0, {0.3, 0.3, 0.6}, 1.8, 5.0, 15.0};
 
 /// One interval of one kind; nothing when `kind` is null.

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
-// A receiver between houses (research/gps C7): RTK fixed, float, code and nothing take turns; errors
-// are correlated in time, a re-fix is sometimes wrong, code positions are sometimes reflections.
+// A receiver between houses (research/gps C7): RTK fixed, float, code and nothing take turns;
+// errors are correlated in time, a re-fix is sometimes wrong, code positions are sometimes
+// reflections.
 #pragma once
 
 #include "drive.hpp"

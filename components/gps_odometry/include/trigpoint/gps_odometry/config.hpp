@@ -38,7 +38,7 @@ struct Eskf18Config {
   double suspect_outage_s{3.0};
   double doubt_hold_s{30.0};
   double doubt_decay_s{5.0};
-  double better_class_decay_s{10.0};
+  double better_class_decay_s{20.0};
 
   // Rest, wheels.
   bool use_rest{true};
