@@ -263,8 +263,13 @@ void describe_ins_vehicle(Eskf18Config& c, ConfigFields& f) {
          "boats and aircraft");
   f.number("no_side_slip_sigma_mps",
            c.no_side_slip_sigma_mps,
-           "Sigma of lateral and vertical velocity",
+           "Sigma of lateral and vertical velocity at low speed",
            kPositive);
+  f.number("no_side_slip_share",
+           c.no_side_slip_share,
+           "And as a share of the speed: slip and mounting angles, which last, so several times "
+           "their size",
+           kNotNegative);
   f.number("no_side_slip_interval_s",
            c.no_side_slip_interval_s,
            "Time between two such measurements",

@@ -188,12 +188,15 @@ void InsTracker::constrain(InsTrack& track, const CheckedImu& imu) const {
   if (track.phase == Phase::kAligning) {
     track.no_side_slip_ns = imu.stamp_ns;
     update_level(track.filter, imu.accel_mps2, kLevelSigma_mps2);
-  } else if (c.no_side_slip && track.filter.v_map_mps.norm() > c.no_side_slip_speed_mps &&
-             filter_yaw_sigma_rad(track) < c.no_side_slip_yaw_sigma_rad) {
+    return;
+  }
+  const double speed = track.filter.v_map_mps.norm();
+  if (c.no_side_slip && speed > c.no_side_slip_speed_mps &&
+      filter_yaw_sigma_rad(track) < c.no_side_slip_yaw_sigma_rad) {
     track.no_side_slip_ns = imu.stamp_ns;
+    const double sigma = std::hypot(c.no_side_slip_sigma_mps, c.no_side_slip_share * speed);
     for_each(track, [&](Eskf18& filter) {
-      update_no_side_slip(
-          filter, c.no_side_slip_sigma_mps, c.no_side_slip_point_base_m, imu.raw_gyro_radps);
+      update_no_side_slip(filter, sigma, c.no_side_slip_point_base_m, imu.raw_gyro_radps);
     });
   }
 }

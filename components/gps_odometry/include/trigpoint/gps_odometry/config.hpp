@@ -16,8 +16,8 @@ namespace trigpoint::gps_odometry {
 /// What eskf18 needs besides the common rules: an inertial navigation system with error states.
 struct Eskf18Config {
   // IMU: densities, vibration included; saturation; turn-on biases.
-  double gyro_noise_radps_sqrthz{8e-4};
-  double accel_noise_mps2_sqrthz{0.013};
+  double gyro_noise_radps_sqrthz{0.0015};
+  double accel_noise_mps2_sqrthz{0.03};
   double gyro_bias_walk_radps_sqrts{1e-5};
   double accel_bias_walk_mps2_sqrts{2e-4};
   double gyro_bias_sigma_radps{0.005};
@@ -47,6 +47,7 @@ struct Eskf18Config {
   double rest_highest_speed_mps{0.3};
   bool no_side_slip{true};
   double no_side_slip_sigma_mps{0.1};
+  double no_side_slip_share{0.1};
   double no_side_slip_interval_s{0.1};
   double no_side_slip_speed_mps{0.4};
   double no_side_slip_yaw_sigma_rad{0.35};
