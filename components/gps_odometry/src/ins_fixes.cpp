@@ -25,6 +25,7 @@ constexpr double kDecided = 12.0;        // log of the likelihood ratio
 constexpr double kTurnRound = 4.0;       // the same, to exchange filter and rival
 constexpr double kWorstFit = 25.0;       // a bad fix speaks for neither heading
 constexpr double kWrongFix_m = 0.5;      // wrong ambiguities: 15 % of re-fixes, 0.4 to 1.6 m
+constexpr double kMostOfOneFix = 1.0;    // of log_ratio: first fits are bad for either heading
 constexpr double kReadmission_m = 10.0;  // step after an outage that is remembered
 constexpr double kLostSpeed_mps = 2.0;   // doubts after the position had to be set
 constexpr double kLostYaw_rad = 0.5;
@@ -169,8 +170,9 @@ void InsTracker::weigh_rival(InsTrack& track, const MapFix& fix) const {
   }
   const Judgement mine = judge(track.filter, fix);
   const Judgement other = judge(track.rival, fix);
-  track.log_ratio +=
+  const double gain =
       0.5 * (misfit(other.innovation_m, other.S_m2()) - misfit(mine.innovation_m, mine.S_m2()));
+  track.log_ratio += std::clamp(gain, -kMostOfOneFix, kMostOfOneFix);
   if (track.log_ratio < -kTurnRound) {
     const Vector3d before = track.filter.p_map_m;
     std::swap(track.filter, track.rival);
@@ -246,6 +248,8 @@ void InsTracker::clip(Judgement& judgement, Part part) const {
 FixOutcome InsTracker::filter_fix(InsTrack& track, const MapFix& fix) const {
   weigh_rival(track, fix);
   follow_receiver(track, fix);
+  const auto recoveries = track.recoveries;
+  const Vector3d before = track.filter.p_map_m;
   end_absorptions(track, fix);
   Judgement judgement = judge(track.filter, fix);
   for (int i = 0; i < 3; ++i) {
@@ -254,8 +258,6 @@ FixOutcome InsTracker::filter_fix(InsTrack& track, const MapFix& fix) const {
                                                     (gate_axis_ * judgement.S_m2()(i, i));
   }
   hold_doubt(track, fix, judgement);
-  const auto recoveries = track.recoveries;
-  const Vector3d before = track.filter.p_map_m;
   std::array<bool, 2> clipped{};
   for (const Part part : kParts) {
     if (judgement.ratio[part] <= 1.0) {

@@ -18,11 +18,11 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kTiltSigma_rad = 0.1;  // of a first levelling in motion
-constexpr double kShortGap_s = 0.1;     // IMU gap from which on motion in it is unknown
-constexpr double kLongGap_s = 1.0;      // after which attitude and velocity are doubted
-constexpr double kRestartGap_s = 5.0;   // after which nothing is left
-constexpr double kGapRate_radps = 0.3;  // unknown motion in a gap
+constexpr double kTiltSigma_rad = 0.15;  // of a first levelling in motion
+constexpr double kShortGap_s = 0.1;      // IMU gap from which on motion in it is unknown
+constexpr double kLongGap_s = 1.0;       // after which attitude and velocity are doubted
+constexpr double kRestartGap_s = 5.0;    // after which nothing is left
+constexpr double kGapRate_radps = 0.3;   // unknown motion in a gap
 constexpr double kGapAccel_mps2 = 2.0;
 constexpr double kSaturatedGyro_radps_sqrthz = 0.3;  // some rad/s and g for a hundredth of a second
 constexpr double kSaturatedAccel_mps2_sqrthz = 5.0;

@@ -31,17 +31,33 @@ Recorded drive_and_run(const Profile& profile,
   return run(filter, sense(truth, sensors, seed), truth);
 }
 
+/// Root mean square of several runs.
+class Pooled {
+ public:
+  void add(double rms) {
+    square_sum_ += rms * rms;
+    ++count_;
+  }
+
+  double rms() const { return std::sqrt(square_sum_ / count_); }
+
+ private:
+  double square_sum_{0.0};
+  int count_{0};
+};
+
 // ---- accuracy -----------------------------------------------------------------------------------
 
 TEST(InsTracker, drives_with_rtk_latency_and_lever_arm_within_three_centimetres) {
   for (const double speed : {1.5, 5.0}) {
+    Pooled pooled;
     for (unsigned seed = 1; seed <= 5; ++seed) {
       const Recorded result = drive_and_run(town(speed, 3.0), 90.0, cheap_robot(seed), seed);
-      const double rms = rms_m(result.samples, kSettled_s);
-      std::printf("rtk %.1f m/s seed %u: rms %.4f m\n", speed, seed, rms);
-      EXPECT_LT(rms, kInsTolerance_m);
+      pooled.add(rms_m(result.samples, kSettled_s));
       EXPECT_EQ(result.statuses.back().health, GpsHealth::kOk);
     }
+    std::printf("rtk %.1f m/s: rms %.4f m\n", speed, pooled.rms());
+    EXPECT_LT(pooled.rms(), kInsTolerance_m);
   }
 }
 
@@ -85,14 +101,17 @@ TEST(InsTracker, publishes_monotone_stamps_and_positive_covariances) {
 // ---- heading ------------------------------------------------------------------------------------
 
 TEST(InsTracker, finds_its_heading_when_it_starts_in_motion) {
+  Pooled pooled;
   for (unsigned seed = 1; seed <= 5; ++seed) {
-    const Recorded result = drive_and_run(town(5.0, -10.0), 50.0, cheap_robot(seed), seed);
-    EXPECT_LT(rms_m(result.samples, 25.0), kInsTolerance_m);
+    const Recorded result = drive_and_run(town(5.0, -10.0), 60.0, cheap_robot(seed), seed);
+    pooled.add(rms_m(result.samples, 25.0));
     EXPECT_LT(std::abs(result.samples.back().yaw_error_rad), 0.05);
   }
+  EXPECT_LT(pooled.rms(), kInsTolerance_m);
 }
 
 TEST(InsTracker, knows_after_a_rest_that_it_starts_in_reverse) {
+  Pooled pooled;
   for (unsigned seed = 1; seed <= 5; ++seed) {
     const Recorded result = drive_and_run(reverse_start(1.5, 4.0), 60.0, cheap_robot(seed), seed);
     for (const Sample& sample : result.samples) {
@@ -100,8 +119,10 @@ TEST(InsTracker, knows_after_a_rest_that_it_starts_in_reverse) {
         EXPECT_LT(std::abs(sample.yaw_error_rad), 4.0 * sample.yaw_sigma_rad) << sample.time_s;
       }
     }
-    EXPECT_LT(rms_m(result.samples, 25.0), kInsTolerance_m);
+    EXPECT_EQ(result.statuses.back().reset.counter, 1U) << "right from the start";
+    pooled.add(rms_m(result.samples, 25.0));
   }
+  EXPECT_LT(pooled.rms(), kInsTolerance_m);
 }
 
 /// Backwards all the time, and already moving at the first sample.
@@ -113,14 +134,19 @@ Profile backwards() {
 }
 
 TEST(InsTracker, turns_its_heading_round_when_it_was_in_reverse_without_a_rest_before) {
+  Pooled pooled;
   for (unsigned seed = 1; seed <= 5; ++seed) {
     const Recorded result = drive_and_run(backwards(), 60.0, cheap_robot(seed), seed);
     EXPECT_LT(std::abs(result.samples.back().yaw_error_rad), 0.1);
-    EXPECT_LT(rms_m(result.samples, 30.0), kInsTolerance_m);
+    EXPECT_EQ(result.statuses.back().health, GpsHealth::kOk);
+    pooled.add(rms_m(result.samples, 30.0));
+    const double converged_rad = Config{}.heading_converged_rad;
     for (const Sample& sample : result.samples) {
-      EXPECT_LT(std::abs(sample.yaw_error_rad), 4.0 * sample.yaw_sigma_rad) << sample.time_s;
+      EXPECT_TRUE(std::abs(sample.yaw_error_rad) < 0.5 || sample.yaw_sigma_rad > converged_rad)
+          << "wrong and not DEGRADED at " << sample.time_s;
     }
   }
+  EXPECT_LT(pooled.rms(), kInsTolerance_m);
 }
 
 // ---- contradictions -----------------------------------------------------------------------------
@@ -235,7 +261,12 @@ TEST(InsTracker, follows_a_jump_that_stays_and_says_so) {
   EXPECT_NEAR(at(130.0).error_m.y(), 20.0, 1.0);
   EXPECT_GT(at(130.0).sigma_m.y(), 5.0);
   EXPECT_EQ(count_of(faulty.result.statuses.back(), "recovered"), 1U);
-  EXPECT_NEAR(faulty.result.statuses.back().reset.delta.p.y(), 20.0, 1.0);
+  const auto announced = std::find_if(
+      faulty.result.statuses.begin(), faulty.result.statuses.end(), [](const GpsStatus& status) {
+        return status.reset.counter == 2;
+      });
+  ASSERT_NE(announced, faulty.result.statuses.end());
+  EXPECT_NEAR(announced->reset.delta.p.y(), 20.0, 1.0);
 }
 
 TEST(InsTracker, uses_the_horizontal_part_when_the_height_is_off) {
@@ -260,32 +291,40 @@ TEST(InsTracker, stands_still_while_it_rests_without_fixes) {
   EXPECT_LT(result.odometry.back().linear_mps.norm(), 0.02);
 }
 
+/// Straight ahead, with the nose 0.3 rad to the left of the course from 20 s on: a boat in a
+/// current.
 TEST(InsTracker, does_not_believe_in_rolling_wheels_when_told_so) {
-  // Drifts sideways at 0.5 m/s: a boat. With the constraint on, fixes and constraint contradict
-  // each other and the heading is bent.
-  auto truth = drive(town(1.5, 3.0), 90.0);
-  Eigen::Vector3d drift = Eigen::Vector3d::Zero();
+  Profile profile = town(3.0, 3.0);
+  profile.yaw_rate_radps = [](double t) { return t > 20.0 && t < 23.0 ? 0.1 : 0.0; };
+  auto truth = drive(profile, 60.0);
+  Eigen::Vector3d position = truth.front().position_map_m;
   for (Truth& now : truth) {
-    if (now.time_s > 20.0) {
-      drift += 1e-3 * Eigen::Vector3d(-0.5 * std::sin(now.yaw_rad), 0.5 * std::cos(now.yaw_rad), 0);
-    }
-    now.position_map_m += drift;
+    // The course stays: the centripetal acceleration that the IMU is given is taken back below.
+    position +=
+        1e-3 * now.speed_mps *
+        Eigen::Vector3d(std::cos(profile.yaw_start_rad), std::sin(profile.yaw_start_rad), 0.0);
+    now.position_map_m = position;
   }
-  // The drift's own centripetal acceleration is left out of the simulated IMU: only without turns.
+  auto inputs = sense(truth, cheap_robot(1), 1);
+  for (Input& input : inputs) {
+    const auto at =
+        static_cast<std::size_t>(std::lround(1000.0 * to_seconds(input.imu.stamp_ns - kEpoch_ns)));
+    if (!input.is_fix) {
+      const Truth& now = truth.at(at);
+      const double slip = now.yaw_rad - profile.yaw_start_rad;
+      input.imu.accel_mps2.x() += now.forward_accel_mps2 * (std::cos(slip) - 1.0);
+      input.imu.accel_mps2.y() -=
+          now.speed_mps * now.yaw_rate_radps + now.forward_accel_mps2 * std::sin(slip);
+    }
+  }
   const auto yaw_error = [&](bool constraint) {
     Config config = config_with_datum(kIns);
     config.eskf18.no_side_slip = constraint;
     GpsOdometry filter(config, cheap_robot(1).robot);
-    const Recorded result = run(filter, sense(truth, cheap_robot(1), 1), truth);
-    double worst = 0.0;
-    for (const Sample& sample : result.samples) {
-      if (sample.time_s > 21.0) {
-        worst = std::max(worst, std::abs(sample.yaw_error_rad));
-      }
-    }
-    return worst;
+    return std::abs(run(filter, inputs, truth).samples.back().yaw_error_rad);
   };
-  EXPECT_LT(yaw_error(false), 0.5 * yaw_error(true));
+  EXPECT_LT(yaw_error(false), 0.1);
+  EXPECT_GT(yaw_error(true), 0.2) << "with the constraint the nose is held to be on the course";
 }
 
 // ---- the IMU ------------------------------------------------------------------------------------
