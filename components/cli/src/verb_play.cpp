@@ -72,7 +72,7 @@ class SessionPart {
                           {reader.summary().path,
                            "dds",
                            mode_of(config),
-                           "ekf15",
+                           config.cores.gps_odometry.filter,
                            to_seconds(part_->last_ns() - part_->first_ns()),
                            wall_s});
       part_->keep_truth(reader);

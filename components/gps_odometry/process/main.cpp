@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
-// The process around gps_odometry's ekf15: imu/data and gps/fix in, gps/odometry and gps/status
-// out.
+// The process around one filter of gps_odometry: imu/data and gps/fix in, gps/odometry and
+// gps/status out. Compiled once for each filter (TRIGPOINT_GPS_FILTER): a program is a filter,
+// whatever `gps_odometry.filter` says for offline runs.
 #include "trigpoint/bus/bus.hpp"
 #include "trigpoint/bus/config.hpp"
 #include "trigpoint/bus/convert.hpp"
@@ -13,11 +14,14 @@
 
 #include <chrono>
 #include <optional>
+#include <string>
 
 namespace {
 
 using namespace trigpoint;
 namespace topics = bus::topics;
+
+constexpr const char* kFilter = TRIGPOINT_GPS_FILTER;
 
 struct Settings {
   RobotConfig robot;
@@ -31,6 +35,7 @@ Settings load(const shell::Options& options) {
                        {{"robot", [&s](ConfigFields& f) { describe(s.robot, f); }},
                         {"bus", [&s](ConfigFields& f) { describe(s.bus, f); }},
                         {"gps_odometry", [&s](ConfigFields& f) { describe(s.filter, f); }}});
+  s.filter.filter = kFilter;
   return s;
 }
 
@@ -170,7 +175,8 @@ int main(int argc, char** argv) {
   return trigpoint::shell::run_program(
       argc,
       argv,
-      "trigpoint_gps_ekf15",
-      "GPS odometry: NavSatFix + IMU -> position with covariance in map (15-state EKF)",
+      std::string("trigpoint_gps_") + kFilter,
+      std::string("GPS odometry: NavSatFix + IMU -> position with covariance in map (filter ") +
+          kFilter + ")",
       run);
 }

@@ -11,6 +11,12 @@ namespace {
 constexpr Bounds kShare{0.0, 1.0};
 
 void describe_output(Config& c, ConfigFields& f) {
+  f.choice(
+      "filter",
+      c.filter,
+      "The filter of an offline run: ekf15 (the paper's states) or eskf18 (error-state INS). On "
+      "the bus each is a program of its own",
+      {"ekf15", "eskf18"});
   f.number("publish_rate_hz", c.publish_rate_hz, "Highest rate of gps/odometry (Hz)", kPositive);
   f.number("dead_reckoning_after_s",
            c.dead_reckoning_after_s,
@@ -168,6 +174,125 @@ void describe_heading(Config& c, ConfigFields& f) {
            kPositive);
 }
 
+void describe_ins_imu(Eskf18Config& c, ConfigFields& f) {
+  f.number("gyro_noise_radps_sqrthz",
+           c.gyro_noise_radps_sqrthz,
+           "Density of the gyro's noise, vibration included",
+           kPositive);
+  f.number("accel_noise_mps2_sqrthz",
+           c.accel_noise_mps2_sqrthz,
+           "Density of the accelerometer's noise, vibration included",
+           kPositive);
+  f.number("gyro_bias_walk_radps_sqrts",
+           c.gyro_bias_walk_radps_sqrts,
+           "Random walk of the gyro's bias (rad/s/sqrt(s))",
+           kPositive);
+  f.number("accel_bias_walk_mps2_sqrts",
+           c.accel_bias_walk_mps2_sqrts,
+           "Random walk of the accelerometer's bias (m/s^2/sqrt(s))",
+           kPositive);
+  f.number("gyro_bias_sigma_radps", c.gyro_bias_sigma_radps, "Gyro bias at start", kPositive);
+  f.number(
+      "accel_bias_sigma_mps2", c.accel_bias_sigma_mps2, "Accelerometer bias at start", kPositive);
+  f.number("gyro_limit_radps",
+           c.gyro_limit_radps,
+           "Range of an axis of the gyro; samples at the limit count as unknown",
+           kPositive);
+  f.number("accel_limit_mps2", c.accel_limit_mps2, "The same of the accelerometer", kPositive);
+}
+
+void describe_ins_fix(Eskf18Config& c, ConfigFields& f) {
+  f.number("fix_slow_share",
+           c.fix_slow_share,
+           "Share of a fix's variance (after fix_sigma_scale) that changes slowly: its own states",
+           kPositive);
+  f.number("fix_white_share",
+           c.fix_white_share,
+           "Share of a fix's variance that is new with every fix",
+           kPositive);
+  f.number("fix_tau_fixed_s",
+           c.fix_tau_fixed_s,
+           "Correlation time of the slow part in class fixed",
+           kPositive);
+  f.number("fix_tau_float_s", c.fix_tau_float_s, "The same in class float", kPositive);
+  f.number("fix_tau_code_s", c.fix_tau_code_s, "The same in other classes", kPositive);
+  f.integer("absorb_fixes",
+            c.absorb_fixes,
+            "After this many contradicting fixes that agree with each other the receiver is held "
+            "to have jumped: its error state takes the difference",
+            {2, 100});
+  f.number("absorb_limit_s",
+           c.absorb_limit_s,
+           "A jump that lasts longer is believed: the position is set to the fixes (s)",
+           kPositive);
+  f.number("suspect_outage_s",
+           c.suspect_outage_s,
+           "After a longer outage (s) the filter, not the receiver, is suspected; after recovery_s "
+           "the position is set to the fixes",
+           kPositive);
+  f.number("doubt_hold_s",
+           c.doubt_hold_s,
+           "After the position was set: for this long its change stays in the published sigma, "
+           "and health DEGRADED (s)",
+           kNotNegative);
+  f.number("doubt_decay_s", c.doubt_decay_s, "Then it decays with this time (s)", kPositive);
+  f.number("better_class_decay_s",
+           c.better_class_decay_s,
+           "Peak hold: a variance that the receiver reported before it became better decays with "
+           "this time in what is published (s)",
+           kPositive);
+}
+
+void describe_ins_vehicle(Eskf18Config& c, ConfigFields& f) {
+  f.flag("use_rest", c.use_rest, "No velocity and no rotation while the IMU says at rest");
+  f.number("rest_velocity_sigma_mps",
+           c.rest_velocity_sigma_mps,
+           "Sigma of the velocity at rest, every half second",
+           kPositive);
+  f.number("rest_gyro_sigma_radps",
+           c.rest_gyro_sigma_radps,
+           "Least sigma of the gyro's mean over half a second at rest",
+           kPositive);
+  f.number("rest_highest_speed_mps",
+           c.rest_highest_speed_mps,
+           "A filter that is faster is not at rest, however quiet the IMU",
+           kPositive);
+  f.flag("no_side_slip",
+         c.no_side_slip,
+         "The vehicle rolls on wheels that do not slide sideways: off for tracks, skid steering, "
+         "boats and aircraft");
+  f.number("no_side_slip_sigma_mps",
+           c.no_side_slip_sigma_mps,
+           "Sigma of lateral and vertical velocity at low speed",
+           kPositive);
+  f.number("no_side_slip_share",
+           c.no_side_slip_share,
+           "And as a share of the speed: slip and mounting angles, which last, so several times "
+           "their size",
+           kNotNegative);
+  f.number("no_side_slip_interval_s",
+           c.no_side_slip_interval_s,
+           "Time between two such measurements",
+           kPositive);
+  f.number("no_side_slip_speed_mps",
+           c.no_side_slip_speed_mps,
+           "Not slower than this: there they would fix a wrong heading",
+           kPositive);
+  f.number("no_side_slip_yaw_sigma_rad",
+           c.no_side_slip_yaw_sigma_rad,
+           "Not with a less certain heading",
+           kPositive);
+  f.vector3("no_side_slip_point_base_m",
+            c.no_side_slip_point_base_m,
+            "The point that does not slide: the middle of the axle that does not steer");
+}
+
+void describe_eskf18(Eskf18Config& config, ConfigFields& fields) {
+  describe_ins_imu(config, fields);
+  describe_ins_fix(config, fields);
+  describe_ins_vehicle(config, fields);
+}
+
 }  // namespace
 
 void describe(Config& config, ConfigFields& fields) {
@@ -177,6 +302,9 @@ void describe(Config& config, ConfigFields& fields) {
   describe_fix(config, fields);
   describe_imu(config, fields);
   describe_heading(config, fields);
+  fields.section("eskf18", "only the filter eskf18", [&config](ConfigFields& f) {
+    describe_eskf18(config.eskf18, f);
+  });
 }
 
 }  // namespace trigpoint::gps_odometry

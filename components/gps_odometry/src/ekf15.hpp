@@ -7,11 +7,10 @@
 // models).
 #pragma once
 
+#include "gravity.hpp"
 #include <Eigen/Core>
 
 namespace trigpoint::gps_odometry {
-
-inline constexpr double kGravity_mps2 = 9.80665;
 
 using Vector15d = Eigen::Matrix<double, 15, 1>;
 using Matrix15d = Eigen::Matrix<double, 15, 15>;

@@ -8,11 +8,10 @@
 
 #include "counters.hpp"
 #include "datum_election.hpp"
+#include "filter.hpp"
 #include "fix_checks.hpp"
 #include "imu_checks.hpp"
-#include "rewind.hpp"
 #include "status.hpp"
-#include "track.hpp"
 
 #include <cmath>
 
@@ -20,7 +19,6 @@ namespace trigpoint::gps_odometry {
 
 namespace {
 
-constexpr const char* kSource = "ekf15";
 constexpr Nanoseconds kStatusInterval_ns = kNanosecondsPerSecond;
 // Fixes ahead of the IMU one after another mean that the IMU has stopped.
 constexpr int kSilentImuFixes = 3;
@@ -50,8 +48,7 @@ struct GpsOdometry::Impl {
       : config(c),
         datum(configured_datum(c)),
         imu_checks(c, robot.q_base_imu()),
-        tracker(c, robot.antenna_position_base_m),
-        buffer(tracker, from_seconds(c.rewind_s)),
+        filter(make_filter(c, robot)),
         election(c) {
     if (datum) {
       frame.emplace(*datum);
@@ -79,8 +76,7 @@ struct GpsOdometry::Impl {
   /// The datum's, or until there is one that of the first fix: heading is searched meanwhile.
   std::optional<geodesy::LocalFrame> frame;
   ImuChecks imu_checks;
-  Tracker tracker;
-  RewindBuffer buffer;
+  std::unique_ptr<Filter> filter;
   DatumElection election;
   FrozenReceiver frozen;
   Counters counters;
@@ -114,17 +110,17 @@ void GpsOdometry::Impl::take_imu(const ImuSample& sample, Output& output) {
     counters.add(verdict.reason);
     output.events.push_back({Severity::kError, sample.stamp_ns, verdict.reason, verdict.text});
   }
-  if (verdict.clock_reset) {
-    buffer.restart();
+  if (verdict.clock_reset && !filter->bridges_gap_until(sample.stamp_ns)) {
+    filter->restart();
     now_ns = sample.stamp_ns;
     published_ns.reset();
     status_ns.reset();
   }
   if (verdict.sample) {
     election.begin(sample.stamp_ns);
-    now_ns = buffer.newest_imu_ns() ? std::max(now_ns, sample.stamp_ns) : sample.stamp_ns;
+    now_ns = filter->newest_imu_ns() ? std::max(now_ns, sample.stamp_ns) : sample.stamp_ns;
     fixes_ahead = 0;
-    buffer.insert(*verdict.sample);
+    filter->insert(*verdict.sample);
     publish_odometry(output);
   }
   if (!status_ns || now_ns - *status_ns >= kStatusInterval_ns) {
@@ -143,8 +139,8 @@ std::optional<CheckedFix> GpsOdometry::Impl::checked(const GnssFix& message, Out
   if (!verdict.fix || is_untimely(*verdict.fix, output)) {
     return std::nullopt;
   }
-  const bool moving = buffer.newest().phase == Phase::kRunning &&
-                      buffer.newest().filter.x.segment<3>(kVelocity).norm() > kFrozenSpeed_mps;
+  const bool moving =
+      filter->newest().phase == Phase::kRunning && filter->speed_mps() > kFrozenSpeed_mps;
   if (const auto repeats = frozen.count(verdict.fix->place);
       moving && repeats > config.frozen_fixes) {
     refuse("frozen",
@@ -159,14 +155,14 @@ std::optional<CheckedFix> GpsOdometry::Impl::checked(const GnssFix& message, Out
 }
 
 bool GpsOdometry::Impl::is_untimely(const CheckedFix& fix, Output& output) {
-  const auto imu_ns = buffer.newest_imu_ns();
+  const auto imu_ns = filter->newest_imu_ns();
   if (!imu_ns) {
     // Its stamp cannot be judged yet.
     refuse("before_imu", "Fix refused: there is no usable IMU sample yet.", fix.stamp_ns, output);
     now_ns = fix.stamp_ns;
     return true;
   }
-  if (buffer.has_fix_at(fix.stamp_ns)) {
+  if (filter->has_fix_at(fix.stamp_ns)) {
     refuse("duplicate_stamp",
            "Fix refused: there was one with its stamp " + std::to_string(to_seconds(fix.stamp_ns)) +
                " s already.",
@@ -174,7 +170,7 @@ bool GpsOdometry::Impl::is_untimely(const CheckedFix& fix, Output& output) {
            output);
     return true;
   }
-  if (buffer.is_too_old(fix.stamp_ns)) {
+  if (filter->is_too_old(fix.stamp_ns)) {
     refuse("too_old",
            "Fix refused: it is " + std::to_string(to_seconds(now_ns - fix.stamp_ns)) +
                " s old, expected at most " + std::to_string(config.rewind_s) + " s.",
@@ -210,7 +206,7 @@ void GpsOdometry::Impl::take_fix(const GnssFix& message, Output& output) {
       frame.emplace(
           Datum{fix->place.latitude_deg, fix->place.longitude_deg, fix->place.height_m, 0});
     }
-    const FixOutcome outcome = buffer.insert(place(*fix));
+    const FixOutcome outcome = filter->insert(place(*fix));
     if (!outcome.reason.empty()) {
       // Counted in the Track, because a later rewind may decide otherwise.
       output.events.push_back({outcome.accepted ? Severity::kInfo : Severity::kWarning,
@@ -247,9 +243,9 @@ void GpsOdometry::Impl::move_to(const Datum& new_datum) {
     const geodesy::Geographic old_origin = place_of(frame->datum());
     const Eigen::Matrix3d R = new_frame.R_map_enu(old_origin);
     const Eigen::Vector3d t = new_frame.to_map(old_origin).value_or(Eigen::Vector3d::Zero());
-    buffer.change_frame(R, t);
+    filter->change_frame(R, t);
     if (datum) {
-      buffer.announce_reset({std::atan2(R(1, 0), R(0, 0)), t});
+      filter->announce_reset({std::atan2(R(1, 0), R(0, 0)), t});
     }
   }
   frame = std::move(new_frame);
@@ -259,28 +255,21 @@ void GpsOdometry::Impl::move_to(const Datum& new_datum) {
 // ---- output -------------------------------------------------------------------------------------
 
 Odometry GpsOdometry::Impl::odometry() const {
-  const Track& track = buffer.newest();
+  const Estimate estimate = filter->estimate();
   Odometry odometry;
-  odometry.stamp_ns = track.stamp_ns;
+  odometry.stamp_ns = filter->newest().stamp_ns;
   odometry.frame_id = "map";
   odometry.child_frame_id = "base_link";
-  odometry.T_frame_child = tracker.pose(track);
-  odometry.pose_covariance = tracker.pose_covariance(track);
-  odometry.angular_radps = track.filter.x.segment<3>(kRate);
-  odometry.twist_covariance = tracker.twist_covariance(track);
-  if (track.phase == Phase::kRunning) {
-    odometry.linear_mps = track.filter.x.segment<3>(kVelocity);
-  } else {
-    odometry.twist_covariance.topLeftCorner<3, 3>() =
-        Eigen::Matrix3d::Identity() * kUnknownVariance;
-    odometry.twist_covariance.topRightCorner<3, 3>().setZero();
-    odometry.twist_covariance.bottomLeftCorner<3, 3>().setZero();
-  }
+  odometry.T_frame_child = estimate.T_map_base;
+  odometry.pose_covariance = estimate.pose_covariance;
+  odometry.linear_mps = estimate.linear_base_mps;
+  odometry.angular_radps = estimate.angular_base_radps;
+  odometry.twist_covariance = estimate.twist_covariance;
   return odometry;
 }
 
 void GpsOdometry::Impl::publish_odometry(Output& output) {
-  const Track& track = buffer.newest();
+  const Track& track = filter->newest();
   if (!datum || track.phase == Phase::kNoImu || track.accepted_ns == 0) {
     return;
   }
@@ -299,15 +288,19 @@ void GpsOdometry::Impl::publish_odometry(Output& output) {
 }
 
 Surroundings GpsOdometry::Impl::around() const {
-  return {now_ns, datum.has_value(), imu_checks.is_faulty(), fixes_ahead >= kSilentImuFixes};
+  return {now_ns,
+          datum.has_value(),
+          imu_checks.is_faulty(),
+          fixes_ahead >= kSilentImuFixes,
+          filter->is_doubtful()};
 }
 
 GpsStatus GpsOdometry::Impl::status() const {
-  const Track& track = buffer.newest();
+  const Track& track = filter->newest();
   GpsStatus status;
   status.stamp_ns = now_ns;
-  status.source = kSource;
-  status.health = health_of(track, tracker.yaw_sigma_rad(track), around(), config);
+  status.source = filter->source();
+  status.health = health_of(track, filter->yaw_sigma_rad(), around(), config);
   status.datum_id = datum ? datum->id() : "";
   status.gnss_class = track.gnss_class;
   if (datum) {

@@ -53,6 +53,7 @@ RestBias::RestBias(const Config& config)
       sigma_radps_(config.gyro_bias_sigma_radps) {}
 
 void RestBias::add(Nanoseconds stamp_ns, const Vector3d& gyro_radps, const Vector3d& accel_mps2) {
+  quiet_.reset();
   if (count_ > 0 && stamp_ns - window_start_ns_ >= kRestWindow_ns) {
     close_window();
   }
@@ -73,9 +74,13 @@ void RestBias::close_window() {
     return;
   }
   const Vector3d mean = gyro_sum_ / count;
-  if (mean.norm() > kRestGyroMean_radps ||
-      spread(gyro_sum_, gyro_square_, count) > kRestGyroSpread_radps ||
+  const double gyro_spread = spread(gyro_sum_, gyro_square_, count);
+  if (gyro_spread > kRestGyroSpread_radps ||
       spread(accel_sum_, accel_square_, count) > kRestAccelSpread_mps2) {
+    return;
+  }
+  quiet_ = QuietWindow{mean, accel_sum_ / count, gyro_spread / std::sqrt(count)};
+  if (mean.norm() > kRestGyroMean_radps) {
     return;
   }
   bias_radps_ =
@@ -137,8 +142,13 @@ ImuVerdict ImuChecks::check(const ImuSample& sample) {
   }
   fault_.clear();
   rest_.add(sample.stamp_ns, gyro, accel);
-  verdict.sample = CheckedImu{
-      sample.stamp_ns, gyro - rest_.bias_radps(), accel, mean_accel_mps2_, rest_.sigma_radps()};
+  verdict.sample = CheckedImu{sample.stamp_ns,
+                              gyro - rest_.bias_radps(),
+                              accel,
+                              mean_accel_mps2_,
+                              rest_.sigma_radps(),
+                              gyro,
+                              rest_.quiet()};
   return verdict;
 }
 

@@ -16,6 +16,13 @@
 
 namespace trigpoint::gps_odometry {
 
+/// Half a second in which nothing shook: at rest, or moving very smoothly.
+struct QuietWindow {
+  Eigen::Vector3d mean_gyro_radps{Eigen::Vector3d::Zero()};  ///< as measured, bias included
+  Eigen::Vector3d mean_accel_mps2{Eigen::Vector3d::Zero()};
+  double gyro_sigma_radps{0.0};  ///< of the mean, by the spread
+};
+
 /// A sample that may be used, in base_link's axes.
 struct CheckedImu {
   Nanoseconds stamp_ns{0};
@@ -23,6 +30,8 @@ struct CheckedImu {
   Eigen::Vector3d accel_mps2{Eigen::Vector3d::Zero()};
   Eigen::Vector3d mean_accel_mps2{Eigen::Vector3d::Zero()};  ///< of about half a second
   double gyro_bias_sigma_radps{0.0};
+  Eigen::Vector3d raw_gyro_radps{Eigen::Vector3d::Zero()};  ///< as measured, bias included
+  std::optional<QuietWindow> quiet;                         ///< just ended
 };
 
 struct ImuVerdict {
@@ -46,6 +55,9 @@ class RestBias {
 
   double sigma_radps() const { return sigma_radps_; }
 
+  /// The window that the newest sample ended, when it was quiet.
+  const std::optional<QuietWindow>& quiet() const { return quiet_; }
+
  private:
   void close_window();
 
@@ -53,6 +65,7 @@ class RestBias {
   double sigma_radps_;
   Eigen::Vector3d bias_radps_{Eigen::Vector3d::Zero()};
   bool known_{false};
+  std::optional<QuietWindow> quiet_;
   Nanoseconds window_start_ns_{0};
   int count_{0};
   Eigen::Vector3d gyro_sum_{Eigen::Vector3d::Zero()};

@@ -2,20 +2,26 @@
 // Copyright the Trigpoint developers
 // Late measurements at their own stamps: the last second of measurements with the Track after each.
 // A late one is put in its place and everything after it is done again, so that the result is that
-// of sorted input.
+// of sorted input. Any filter's tracker fits that has a plain `State` derived from Track.
 #pragma once
 
+#include "imu_checks.hpp"
 #include "track.hpp"
 
+#include <algorithm>
 #include <deque>
+#include <iterator>
 #include <optional>
 #include <variant>
 
 namespace trigpoint::gps_odometry {
 
+template <typename TrackerType>
 class RewindBuffer {
  public:
-  RewindBuffer(const Tracker& tracker, Nanoseconds length_ns);
+  using State = typename TrackerType::State;
+
+  RewindBuffer(const TrackerType& tracker, Nanoseconds length_ns);
 
   /// IMU samples come in order among themselves, but may be older than a fix.
   void insert(const CheckedImu& imu);
@@ -27,7 +33,7 @@ class RewindBuffer {
   bool has_fix_at(Nanoseconds stamp_ns) const;
 
   /// The newest state.
-  const Track& newest() const { return entries_.empty() ? before_ : entries_.back().after; }
+  const State& newest() const { return entries_.empty() ? before_ : entries_.back().after; }
 
   std::optional<Nanoseconds> newest_imu_ns() const { return newest_imu_ns_; }
 
@@ -45,18 +51,138 @@ class RewindBuffer {
   struct Entry {
     Nanoseconds stamp_ns{0};
     Measurement measurement;
-    Track after;
+    State after;
   };
 
   FixOutcome insert(Nanoseconds stamp_ns, const Measurement& measurement);
-  FixOutcome apply(Entry& entry, const Track& before) const;
+  FixOutcome apply(Entry& entry, const State& before) const;
   void forget_old();
 
-  const Tracker& tracker_;
+  const TrackerType& tracker_;
   Nanoseconds length_ns_;
-  Track before_;  ///< the state before the oldest entry
+  State before_;  ///< the state before the oldest entry
   std::deque<Entry> entries_;
   std::optional<Nanoseconds> newest_imu_ns_;
 };
+
+template <typename TrackerType>
+RewindBuffer<TrackerType>::RewindBuffer(const TrackerType& tracker, Nanoseconds length_ns)
+    : tracker_(tracker), length_ns_(length_ns) {}
+
+template <typename TrackerType>
+void RewindBuffer<TrackerType>::insert(const CheckedImu& imu) {
+  newest_imu_ns_ = imu.stamp_ns;
+  insert(imu.stamp_ns, imu);
+  forget_old();
+}
+
+template <typename TrackerType>
+FixOutcome RewindBuffer<TrackerType>::insert(const MapFix& fix) {
+  const FixOutcome outcome = insert(fix.checked.stamp_ns, fix);
+  forget_old();
+  return outcome;
+}
+
+template <typename TrackerType>
+FixOutcome RewindBuffer<TrackerType>::insert(Nanoseconds stamp_ns, const Measurement& measurement) {
+  const auto is_before = [&](const Entry& entry) {
+    return entry.stamp_ns < stamp_ns ||
+           (entry.stamp_ns == stamp_ns && entry.measurement.index() <= measurement.index());
+  };
+  // From the end: nearly everything comes in order.
+  auto place = entries_.end();
+  while (place != entries_.begin() && !is_before(*std::prev(place))) {
+    --place;
+  }
+  place = entries_.insert(place, Entry{stamp_ns, measurement, State{}});
+  const auto before = [&](auto it) -> const State& {
+    return it == entries_.begin() ? before_ : std::prev(it)->after;
+  };
+  const FixOutcome outcome = apply(*place, before(place));
+  for (auto it = std::next(place); it != entries_.end(); ++it) {
+    apply(*it, before(it));
+  }
+  return outcome;
+}
+
+template <typename TrackerType>
+FixOutcome RewindBuffer<TrackerType>::apply(Entry& entry, const State& before) const {
+  entry.after = before;
+  FixOutcome outcome;
+  if (const auto* imu = std::get_if<CheckedImu>(&entry.measurement)) {
+    tracker_.apply(entry.after, *imu);
+  } else {
+    outcome = tracker_.apply(entry.after, std::get<MapFix>(entry.measurement));
+  }
+  if (!entry.after.filter.is_finite()) {
+    // Cannot be, and must not spread if it is: start again from the next sample.
+    entry.after = before;
+    entry.after.phase = Phase::kNoImu;
+    ++entry.after.not_finite;
+    ++entry.after.reset.counter;
+    outcome = {false, "state_not_finite", "The filter's state was not finite; it starts again."};
+  }
+  return outcome;
+}
+
+template <typename TrackerType>
+bool RewindBuffer<TrackerType>::is_too_old(Nanoseconds stamp_ns) const {
+  return !entries_.empty() &&
+         stamp_ns < std::max(before_.stamp_ns, entries_.back().stamp_ns - length_ns_);
+}
+
+template <typename TrackerType>
+bool RewindBuffer<TrackerType>::has_fix_at(Nanoseconds stamp_ns) const {
+  return std::any_of(entries_.begin(), entries_.end(), [&](const Entry& entry) {
+    return entry.stamp_ns == stamp_ns && std::holds_alternative<MapFix>(entry.measurement);
+  });
+}
+
+template <typename TrackerType>
+void RewindBuffer<TrackerType>::forget_old() {
+  while (entries_.size() > 1 && entries_.front().stamp_ns < entries_.back().stamp_ns - length_ns_) {
+    before_ = entries_.front().after;
+    entries_.pop_front();
+  }
+}
+
+template <typename TrackerType>
+void RewindBuffer<TrackerType>::restart() {
+  State fresh = newest();
+  fresh.phase = Phase::kNoImu;
+  fresh.stamp_ns = fresh.imu_ns = fresh.accepted_ns = fresh.refused_ns = fresh.reset_ns = 0;
+  fresh.refused = fresh.refused_height = RefusedStreak{};
+  ++fresh.reset.counter;
+  fresh.reset.delta = {};
+  before_ = fresh;
+  entries_.clear();
+  newest_imu_ns_.reset();
+}
+
+template <typename TrackerType>
+void RewindBuffer<TrackerType>::change_frame(const Eigen::Matrix3d& R_new_old,
+                                             const Eigen::Vector3d& t_new_old) {
+  tracker_.change_frame(before_, R_new_old, t_new_old);
+  for (Entry& entry : entries_) {
+    tracker_.change_frame(entry.after, R_new_old, t_new_old);
+    if (auto* fix = std::get_if<MapFix>(&entry.measurement)) {
+      fix->antenna_map_m = R_new_old * fix->antenna_map_m + t_new_old;
+      fix->covariance_map_m2 = R_new_old * fix->covariance_map_m2 * R_new_old.transpose();
+    }
+  }
+}
+
+template <typename TrackerType>
+void RewindBuffer<TrackerType>::announce_reset(const YawPose& delta) {
+  const auto announce = [&](State& track) {
+    ++track.reset.counter;
+    track.reset.delta = delta;
+    track.reset_ns = track.stamp_ns;
+  };
+  announce(before_);
+  for (Entry& entry : entries_) {
+    announce(entry.after);
+  }
+}
 
 }  // namespace trigpoint::gps_odometry

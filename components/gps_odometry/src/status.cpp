@@ -3,7 +3,6 @@
 #include "status.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace trigpoint::gps_odometry {
 
@@ -12,7 +11,6 @@ namespace {
 // After a reset or a refusal, consumers are told for this long that all was not well.
 constexpr double kRecently_s = 2.0;
 constexpr double kIntervals = 2.5;
-constexpr double kSteep_rad = 1.4;  // roll pitch yaw become singular at pitch 90 degrees
 
 bool is_recent(Nanoseconds stamp_ns, Nanoseconds now_ns) {
   return stamp_ns > 0 && to_seconds(now_ns - stamp_ns) < kRecently_s;
@@ -42,8 +40,7 @@ GpsHealth health_of(const Track& track,
     return GpsHealth::kDeadReckoning;
   }
   const bool doubtful = track.assumed_covariance || is_recent(track.refused_ns, around.now_ns) ||
-                        is_recent(track.reset_ns, around.now_ns) ||
-                        std::abs(track.filter.x(kAttitude + 1)) > kSteep_rad;
+                        is_recent(track.reset_ns, around.now_ns) || around.filter_doubts;
   if (doubtful || yaw_sigma_rad > config.heading_converged_rad) {
     return GpsHealth::kDegraded;
   }

@@ -16,6 +16,7 @@ struct Surroundings {
   bool has_datum{false};
   bool imu_faulty{false};
   bool imu_silent{false};
+  bool filter_doubts{false};  ///< the filter has a reason of its own
 };
 
 GpsHealth health_of(const Track& track,

@@ -2,335 +2,45 @@
 // Copyright the Trigpoint developers
 #include "track.hpp"
 
-#include "trigpoint/base/so3.hpp"
-
-#include "chi_square.hpp"
-#include <Eigen/Cholesky>
-#include <Eigen/Geometry>
-
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace trigpoint::gps_odometry {
 
 namespace {
 
-using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kTiltSigma_rad = 0.1;  // of a first levelling in motion
-constexpr double kUnknownYaw_rad = std::numbers::pi;
-constexpr double kLongGap_s = 1.0;     // IMU gap after which attitude and velocity are doubted
-constexpr double kRestartGap_s = 5.0;  // IMU gap after which nothing is left
-constexpr double kTeleportMargin_m = 5.0;
-constexpr double kAligningSpeedSigma_mps = 1.0;
 constexpr int kRecoveryFixes = 4;
 constexpr double kRecoveryGap_s = 5.0;  // refused fixes further apart are not one streak
-constexpr double kGyroBiasGrowth = 3.3;
-constexpr double kAccelBiasGrowth = 3.0;
-constexpr double kIgnoredHeight_m2 = 1e8;
 
-}  // namespace
-
-Tracker::Tracker(const Config& config, const Vector3d& lever_base_m)
-    : config_(config),
-      lever_base_m_(lever_base_m),
-      gate2_(chi_square_limit_2(config.gate_probability)),
-      gate1_(chi_square_limit_1(config.gate_probability)) {}
-
-// ---- IMU ----------------------------------------------------------------------------------------
-
-void Tracker::start(Track& track, const CheckedImu& imu) const {
-  track.phase = Phase::kAligning;
-  track.filter = Ekf15{};
-  // Level: the mean specific force is up. Heading stays open: 0 in a frame of its own.
-  const Eigen::Quaterniond level = rotation_between(imu.mean_accel_mps2, Vector3d::UnitZ());
-  track.filter.x.segment<3>(kAttitude) = roll_pitch_yaw_of(from_yaw(-yaw_of(level)) * level);
-  track.filter.x.segment<3>(kRate) = imu.gyro_radps;
-  Vector15d sigma;
-  sigma << 1.0, 1.0, 1.0, kTiltSigma_rad, kTiltSigma_rad, 1e-3, 3.0, 3.0, 1.0, 0.1, 0.1, 0.1, 1.0,
-      1.0, 1.0;
-  track.filter.P = sigma.cwiseAbs2().asDiagonal();
-  track.heading.restart();
-}
-
-MotionNoise Tracker::noise(const Track& track) const {
-  // The state has no biases. Without fixes a constant accelerometer bias b makes the position's
-  // variance b^2 t^4 / 4; a random walk of the velocity with the rate 3 b^2 t makes the same. For a
-  // gyro bias through the tilt, b^2 g^2 t^6 / 36, the rate is 3.3 b^2 t. So the rates grow with the
-  // age of the last fix, from what fixes cannot see on.
-  const double age_s = track.accepted_ns > 0 ? to_seconds(track.stamp_ns - track.accepted_ns) : 0.0;
-  const double gyro_horizon_s = std::max(config_.gyro_bias_horizon_s, kGyroBiasGrowth * age_s);
-  const double accel_horizon_s = std::max(config_.accel_bias_horizon_s, kAccelBiasGrowth * age_s);
-  MotionNoise noise;
-  noise.attitude_rad_sqrts = std::hypot(config_.attitude_noise_rad_sqrts,
-                                        track.gyro_bias_sigma_radps * std::sqrt(gyro_horizon_s));
-  noise.velocity_mps_sqrts = config_.accel_bias_sigma_mps2 * std::sqrt(accel_horizon_s);
-  noise.rate_radps_sqrts = config_.rate_noise_radps_sqrts;
-  noise.acceleration_sigma_mps2 = config_.acceleration_sigma_mps2;
-  noise.acceleration_tau_s = config_.acceleration_tau_s;
-  return noise;
-}
-
-void Tracker::advance(Track& track, Nanoseconds stamp_ns) const {
-  predict(
-      track.filter, to_seconds(stamp_ns - track.stamp_ns), config_.longest_step_s, noise(track));
-  track.stamp_ns = std::max(track.stamp_ns, stamp_ns);
-}
-
-void Tracker::apply(Track& track, const CheckedImu& imu) const {
-  const double gap_s = to_seconds(imu.stamp_ns - track.imu_ns);
-  if (track.phase == Phase::kNoImu || gap_s > kRestartGap_s) {
-    start(track, imu);
-  } else {
-    advance(track, imu.stamp_ns);
-    if (gap_s > kLongGap_s) {
-      reset_block(track.filter, kVelocity, Matrix3d::Identity() * 9.0);
-      track.filter.P.block<3, 3>(kAttitude, kAttitude).diagonal().array() +=
-          gap_s * kTiltSigma_rad * kTiltSigma_rad;
-    }
-    update_imu(track.filter,
-               imu.gyro_radps,
-               imu.accel_mps2,
-               config_.gyro_sigma_radps,
-               config_.accel_sigma_mps2);
-  }
-  track.stamp_ns = std::max(track.stamp_ns, imu.stamp_ns);
-  track.imu_ns = imu.stamp_ns;
-  track.gyro_bias_sigma_radps = imu.gyro_bias_sigma_radps;
-}
-
-// ---- fixes --------------------------------------------------------------------------------------
-
-FixOutcome Tracker::apply(Track& track, const MapFix& fix) const {
-  if (track.phase == Phase::kNoImu) {
-    ++track.refused_before_imu;
-    return {false, "before_imu", "Fix refused: there is no usable IMU sample yet."};
-  }
-  advance(track, fix.checked.stamp_ns);
-  const bool lost =
-      track.phase == Phase::kRunning && yaw_sigma_rad(track) > config_.heading_lost_rad;
-  if (lost) {
-    track.phase = Phase::kAligning;
-    track.heading.restart();
-    track.accepted_ns = 0;  // whatever the fix says is better than this
-  }
-  return track.phase == Phase::kAligning ? align(track, fix) : filter_fix(track, fix);
-}
-
-double Tracker::teleport_limit_m(const Track& track, const MapFix& fix) const {
-  const double elapsed_s = to_seconds(fix.checked.stamp_ns - track.accepted_ns);
-  const double variance = fix.covariance_map_m2.diagonal().maxCoeff() +
-                          track.accepted_covariance_map_m2.diagonal().maxCoeff();
-  return config_.highest_speed_mps * std::abs(elapsed_s) + kTeleportMargin_m +
-         5.0 * std::sqrt(variance);
-}
-
-FixOutcome Tracker::align(Track& track, const MapFix& fix) const {
-  const Vector3d step = fix.antenna_map_m - track.accepted_antenna_map_m;
-  if (track.accepted_ns > 0 && step.norm() > teleport_limit_m(track, fix)) {
-    return refuse(track,
-                  fix,
-                  "teleport",
-                  "it is " + std::to_string(step.norm()) +
-                      " m from the last one, expected at most " +
-                      std::to_string(teleport_limit_m(track, fix)) + " m.");
-  }
-  const double elapsed_s = to_seconds(fix.checked.stamp_ns - track.accepted_ns);
-  if (track.accepted_ns > 0 && elapsed_s > 0.0) {
-    track.speed_mps = step.head<2>().norm() / elapsed_s;
-  }
-  const Matrix3d R = track.filter.R_map_base();  // map's tilt, a heading of its own
-  CoursePoint point;
-  point.stamp_ns = fix.checked.stamp_ns;
-  point.antenna_map_m = fix.antenna_map_m.head<2>();
-  point.sigma_m = std::sqrt(fix.covariance_map_m2.diagonal().head<2>().maxCoeff());
-  point.yaw_relative_rad = track.filter.x(kAttitude + 2);
-  point.lever_relative_m = (R * lever_base_m_).head<2>();
-  const auto heading = track.heading.add(point, config_);
-  if (heading) {
-    begin_running(track, fix, *heading);
-  } else {
-    // Nothing else holds the velocity meanwhile; without a bound it would upset roll and pitch.
-    const double speed = track.speed_mps;
-    update_velocity(track.filter, {speed, 0.0, 0.0}, Vector3d(1.0 + 0.5 * speed, 1.0, 1.0));
-  }
-  accept(track, fix);
-  return {true, "", ""};
-}
-
-void Tracker::begin_running(Track& track, const MapFix& fix, const HeadingEstimate& heading) const {
-  Ekf15& filter = track.filter;
-  const Vector3d before = pose(track).p;
-  filter.x(kAttitude + 2) = wrap_angle(filter.x(kAttitude + 2) + heading.yaw_map_relative_rad);
-  filter.P.row(kAttitude + 2).setZero();
-  filter.P.col(kAttitude + 2).setZero();
-  filter.P(kAttitude + 2, kAttitude + 2) = heading.sigma_rad * heading.sigma_rad;
-  filter.x.segment<3>(kVelocity) = Vector3d(heading.speed_mps, 0.0, 0.0);
-  reset_block(
-      filter, kVelocity, Matrix3d::Identity() * heading.speed_sigma_mps * heading.speed_sigma_mps);
-  const Vector3d lever_map = filter.R_map_base() * lever_base_m_;
-  filter.x.segment<3>(kPosition) = fix.antenna_map_m - lever_map;
-  const Matrix3d lever_part =
-      lever_map.squaredNorm() *
-      (kTiltSigma_rad * kTiltSigma_rad + heading.sigma_rad * heading.sigma_rad) *
-      Matrix3d::Identity();
-  reset_block(filter, kPosition, fix.covariance_map_m2 + lever_part);
-  track.phase = Phase::kRunning;
-  track.refused = RefusedStreak{};
-  track.refused_height = RefusedStreak{};
-  if (track.accepted_ns > 0) {
-    ++track.reset.counter;
-    track.reset.delta = {heading.yaw_map_relative_rad, filter.x.segment<3>(kPosition) - before};
-    track.reset_ns = fix.checked.stamp_ns;
-  }
-}
-
-FixOutcome Tracker::filter_fix(Track& track, const MapFix& fix) const {
-  Ekf15& filter = track.filter;
-  const auto H = antenna_jacobian(filter.x, lever_base_m_);
-  const Vector3d innovation = fix.antenna_map_m - expected_antenna(filter.x, lever_base_m_);
-  const Matrix3d S = H * filter.P * H.transpose() + fix.covariance_map_m2;
-  for (int i = 0; i < 3; ++i) {
-    track.test_ratio[static_cast<std::size_t>(i)] =
-        innovation(i) * innovation(i) / (gate1_ * S(i, i));
-  }
-  const double limit_m =
-      config_.highest_speed_mps * std::abs(to_seconds(fix.checked.stamp_ns - track.accepted_ns)) +
-      kTeleportMargin_m + 5.0 * std::sqrt(S.diagonal().maxCoeff());
-  const double distance2 =
-      innovation.head<2>().dot(S.topLeftCorner<2, 2>().ldlt().solve(innovation.head<2>()));
-  if (innovation.norm() > limit_m) {
-    return refuse(track,
-                  fix,
-                  "teleport",
-                  "it is " + std::to_string(innovation.norm()) +
-                      " m from where the filter is, expected at most " + std::to_string(limit_m) +
-                      " m.");
-  }
-  if (!(distance2 <= gate2_)) {
-    return refuse(track,
-                  fix,
-                  "gate",
-                  "its squared Mahalanobis distance is " + std::to_string(distance2) +
-                      ", expected at most " + std::to_string(gate2_) + " (2 degrees of freedom).");
-  }
-  FixOutcome outcome{true, "", ""};
-  Matrix3d R = fix.covariance_map_m2;
-  if (innovation.z() * innovation.z() > gate1_ * S(2, 2)) {
-    outcome = {true,
-               "used_without_height",
-               "The fix's height is " + std::to_string(innovation.z()) +
-                   " m from the filter's, sigma " + std::to_string(std::sqrt(S(2, 2))) +
-                   " m; only its horizontal part is used."};
-    ++track.used_without_height;
-    R.row(2).setZero();
-    R.col(2).setZero();
-    R(2, 2) = kIgnoredHeight_m2;
-    if (extend(track.refused_height, fix)) {
-      recover_height(track, fix);
-    }
-  } else {
-    track.refused_height = RefusedStreak{};
-  }
-  update_antenna(filter, fix.antenna_map_m, R, lever_base_m_);
-  accept(track, fix);
-  return outcome;
-}
-
-bool Tracker::agrees(const RefusedStreak& streak, const MapFix& fix) const {
+bool agrees(const RefusedStreak& streak, const MapFix& fix, double highest_speed_mps) {
   const double elapsed_s = to_seconds(fix.checked.stamp_ns - streak.last_ns);
   const double sigma = std::sqrt(fix.covariance_map_m2.diagonal().maxCoeff());
   const double step = (fix.antenna_map_m - streak.last_map_m).norm();
   return elapsed_s >= 0.0 && elapsed_s < kRecoveryGap_s &&
-         step < config_.highest_speed_mps * elapsed_s + 5.0 * sigma;
+         step < highest_speed_mps * elapsed_s + 5.0 * sigma;
 }
 
-/// True when the streak is long enough to be believed.
-bool Tracker::extend(RefusedStreak& streak, const MapFix& fix) const {
-  if (streak.count == 0 || !agrees(streak, fix)) {
+}  // namespace
+
+void extend(RefusedStreak& streak, const MapFix& fix, double highest_speed_mps) {
+  if (streak.count == 0 || !agrees(streak, fix, highest_speed_mps)) {
     streak = RefusedStreak{0, fix.checked.stamp_ns, 0, Vector3d::Zero()};
   }
   ++streak.count;
   streak.last_ns = fix.checked.stamp_ns;
   streak.last_map_m = fix.antenna_map_m;
+}
+
+bool is_believed(const RefusedStreak& streak, double recovery_s) {
   return streak.count >= kRecoveryFixes &&
-         to_seconds(streak.last_ns - streak.first_ns) >= config_.recovery_s;
+         to_seconds(streak.last_ns - streak.first_ns) >= recovery_s;
 }
 
-FixOutcome Tracker::refuse(Track& track,
-                           const MapFix& fix,
-                           const std::string& reason,
-                           const std::string& text) const {
-  if (extend(track.refused, fix)) {
-    recover(track, fix);
-    return {true,
-            "recovered",
-            "Fixes that agree with each other were refused for " +
-                std::to_string(config_.recovery_s) +
-                " s: the position is set to them. Of the last, " + text};
-  }
-  track.refused_ns = fix.checked.stamp_ns;
-  ++(reason == "gate" ? track.refused_gate : track.refused_teleport);
-  return {false, reason, "Fix refused: " + text};
-}
-
-void Tracker::recover(Track& track, const MapFix& fix) const {
-  const Vector3d before = pose(track).p;
-  if (track.phase == Phase::kRunning) {
-    Ekf15& filter = track.filter;
-    const Vector3d innovation = fix.antenna_map_m - expected_antenna(filter.x, lever_base_m_);
-    filter.x.segment<3>(kPosition) += innovation;
-    reset_block(filter, kPosition, fix.covariance_map_m2);
-    const Matrix3d P_velocity =
-        filter.P.block<3, 3>(kVelocity, kVelocity) + Matrix3d::Identity() * 4.0;
-    reset_block(filter, kVelocity, P_velocity);
-    // A position that had to be set may have been lost because of the heading.
-    filter.P(kAttitude + 2, kAttitude + 2) += 0.25;
-    // Who was right is open: the published sigma remembers half of the disagreement for a while.
-    track.correlated_m2 = track.correlated_m2.cwiseMax(0.25 * innovation.cwiseAbs2());
-  } else {
-    track.heading.restart();
-  }
-  ++track.recoveries;
-  track.refused_height = RefusedStreak{};
-  track.accepted_ns = fix.checked.stamp_ns;  // what was just raised must not decay at once
-  accept(track, fix);
-  ++track.reset.counter;
-  track.reset.delta = {0.0, pose(track).p - before};
-  track.reset_ns = fix.checked.stamp_ns;
-}
-
-void Tracker::recover_height(Track& track, const MapFix& fix) const {
-  Ekf15& filter = track.filter;
-  const double innovation = fix.antenna_map_m.z() - expected_antenna(filter.x, lever_base_m_).z();
-  for (const int i : {kPosition + 2, kVelocity + 2}) {
-    const double variance = i == kPosition + 2 ? fix.covariance_map_m2(2, 2) : filter.P(i, i) + 1.0;
-    filter.P.row(i).setZero();
-    filter.P.col(i).setZero();
-    filter.P(i, i) = variance;
-  }
-  filter.x(kPosition + 2) += innovation;
-  track.correlated_m2.z() = std::max(track.correlated_m2.z(), 0.25 * innovation * innovation);
-  track.refused_height = RefusedStreak{};
-  ++track.recoveries;
-  ++track.reset.counter;
-  track.reset.delta = {0.0, Vector3d(0.0, 0.0, innovation)};
-  track.reset_ns = fix.checked.stamp_ns;
-}
-
-/// Peak hold: rises at once, falls with the decay time.
-void Tracker::hold_correlated(Track& track, const MapFix& fix, double elapsed_s) const {
-  const Vector3d now = config_.fix_correlated_share * fix.covariance_map_m2.diagonal();
-  const double keep = std::exp(-std::clamp(elapsed_s, 0.0, 60.0) / config_.correlated_decay_s);
-  track.correlated_m2 = now.cwiseMax(keep * track.correlated_m2 + (1.0 - keep) * now);
-}
-
-void Tracker::accept(Track& track, const MapFix& fix) const {
+void note_accepted(Track& track, const MapFix& fix) {
   const double elapsed_s =
       track.accepted_ns > 0 ? to_seconds(fix.checked.stamp_ns - track.accepted_ns) : 0.0;
-  hold_correlated(track, fix, elapsed_s);
   if (elapsed_s > 0.0) {
     const double interval = std::min(elapsed_s, 2.0);
     track.fix_interval_s =
@@ -341,84 +51,18 @@ void Tracker::accept(Track& track, const MapFix& fix) const {
   track.accepted_ns = fix.checked.stamp_ns;
   track.gnss_class = fix.checked.gnss_class;
   track.assumed_covariance = fix.checked.assumed_covariance;
-  if (track.phase == Phase::kRunning) {
-    const auto H = antenna_jacobian(track.filter.x, lever_base_m_);
-    track.accepted_antenna_map_m = expected_antenna(track.filter.x, lever_base_m_);
-    track.accepted_covariance_map_m2 = H * track.filter.P * H.transpose();
-  } else {
-    track.accepted_antenna_map_m = fix.antenna_map_m;
-    track.accepted_covariance_map_m2 = fix.covariance_map_m2;
-  }
-  track.accepted_covariance_map_m2.diagonal() += track.correlated_m2 + floor_variance_m2(track);
 }
 
-// ---- what is published --------------------------------------------------------------------------
-
-Vector3d Tracker::floor_variance_m2(const Track& track) const {
-  const double sigma = track.gnss_class == GnssClass::kFixed ? config_.floor_sigma_fixed_m
-                                                             : config_.floor_sigma_other_m;
+Vector3d floor_variance_m2(const Track& track, const Config& config) {
+  const double sigma = track.gnss_class == GnssClass::kFixed ? config.floor_sigma_fixed_m
+                                                             : config.floor_sigma_other_m;
   return Vector3d(sigma, sigma, 2.0 * sigma).cwiseAbs2();
 }
 
-Pose Tracker::pose(const Track& track) const {
-  const Vector3d rpy = track.filter.x.segment<3>(kAttitude);
-  if (track.phase == Phase::kRunning) {
-    return {from_roll_pitch_yaw(rpy), track.filter.x.segment<3>(kPosition)};
-  }
-  const Eigen::Quaterniond level = from_roll_pitch_yaw({rpy.x(), rpy.y(), 0.0});
-  Vector3d position = track.accepted_antenna_map_m;
-  position.z() -= (level * lever_base_m_).z();  // which way the rest of the arm points is not known
-  return {level, position};
-}
-
-PoseCovariance Tracker::pose_covariance(const Track& track) const {
-  const Vector3d rpy = track.filter.x.segment<3>(kAttitude);
-  // Small rotations about the axes of map from small changes of roll, pitch, yaw.
-  Eigen::Matrix<double, 6, 6> J = Eigen::Matrix<double, 6, 6>::Identity();
-  J.bottomRightCorner<3, 3>() = track.filter.R_map_base() * body_from_euler_rates(rpy);
-  PoseCovariance covariance = J * track.filter.P.topLeftCorner<6, 6>() * J.transpose();
-  if (track.phase == Phase::kRunning) {
-    covariance.diagonal().head<3>() += track.correlated_m2 + floor_variance_m2(track);
-    return 0.5 * (covariance + covariance.transpose());
-  }
-  PoseCovariance aligning = PoseCovariance::Zero();
-  const double age_s = std::max(0.0, to_seconds(track.stamp_ns - track.accepted_ns));
-  const double moved_m = age_s * (track.speed_mps + kAligningSpeedSigma_mps);
-  aligning.topLeftCorner<3, 3>() =
-      track.accepted_covariance_map_m2 + moved_m * moved_m * Matrix3d::Identity();
-  aligning.topLeftCorner<2, 2>() +=
-      lever_base_m_.head<2>().squaredNorm() * Eigen::Matrix2d::Identity();
-  // Roll and pitch about axes of unknown direction.
-  const double tilt = covariance.diagonal().segment<2>(3).maxCoeff();
-  aligning.diagonal().tail<3>() << tilt, tilt, kUnknownYaw_rad * kUnknownYaw_rad;
-  return aligning;
-}
-
-Matrix6d Tracker::twist_covariance(const Track& track) const {
-  const Matrix6d covariance = track.filter.P.block<6, 6>(kVelocity, kVelocity);
-  return 0.5 * (covariance + covariance.transpose());
-}
-
-double Tracker::yaw_sigma_rad(const Track& track) const {
-  return track.phase == Phase::kRunning
-             ? std::sqrt(std::max(0.0, track.filter.P(kAttitude + 2, kAttitude + 2)))
-             : kUnknownYaw_rad;
-}
-
-void Tracker::change_frame(Track& track,
-                           const Matrix3d& R_new_old,
-                           const Vector3d& t_new_old) const {
-  const auto move = [&](Vector3d& point) { point = R_new_old * point + t_new_old; };
-  if (track.phase == Phase::kRunning) {
-    gps_odometry::change_frame(track.filter, R_new_old, t_new_old);
-  }
-  // While aligning the filter's own heading is free of map: its attitude stays.
-  track.heading.change_frame(R_new_old.topLeftCorner<2, 2>(), t_new_old.head<2>());
-  move(track.accepted_antenna_map_m);
-  track.accepted_covariance_map_m2 =
-      R_new_old * track.accepted_covariance_map_m2 * R_new_old.transpose();
-  move(track.refused.last_map_m);
-  move(track.refused_height.last_map_m);
+void forget_velocity(Estimate& estimate) {
+  estimate.twist_covariance.topLeftCorner<3, 3>() = Eigen::Matrix3d::Identity() * kUnknownVariance;
+  estimate.twist_covariance.topRightCorner<3, 3>().setZero();
+  estimate.twist_covariance.bottomLeftCorner<3, 3>().setZero();
 }
 
 }  // namespace trigpoint::gps_odometry

@@ -1,17 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
-// Everything that depends on the order of measurements: the filter, the search for heading, the
-// gate and its recovery. A Track is plain data, a function of the sorted measurements up to its
-// time, so that the rewind buffer can keep and restore it.
+// What every filter's Track has: plain data, a function of the sorted measurements up to its time,
+// so that the rewind buffer can keep and restore it.
 #pragma once
 
 #include "trigpoint/base/messages.hpp"
 #include "trigpoint/gps_odometry/config.hpp"
 
-#include "ekf15.hpp"
 #include "fix_checks.hpp"
-#include "heading.hpp"
-#include "imu_checks.hpp"
 #include <Eigen/Core>
 
 #include <array>
@@ -45,9 +41,6 @@ struct Track {
   Phase phase{Phase::kNoImu};
   Nanoseconds stamp_ns{0};
   Nanoseconds imu_ns{0};
-  Ekf15 filter;
-  double gyro_bias_sigma_radps{0.0};
-  HeadingSearch heading;
 
   // The newest accepted fix: what it left of the antenna's position.
   Nanoseconds accepted_ns{0};
@@ -57,10 +50,6 @@ struct Track {
   bool assumed_covariance{false};
   double fix_interval_s{0.0};  ///< smoothed, of accepted fixes
   double speed_mps{0.0};       ///< between the last two accepted fixes, while aligning
-
-  /// Variance of GPS error that is common to successive fixes (per axis of map): not seen by the
-  /// filter, added to what is published.
-  Eigen::Vector3d correlated_m2{Eigen::Vector3d::Zero()};
 
   RefusedStreak refused;
   RefusedStreak refused_height;
@@ -85,51 +74,29 @@ struct FixOutcome {
   std::string text;
 };
 
-/// The rules by which measurements change a Track.
-class Tracker {
- public:
-  Tracker(const Config& config, const Eigen::Vector3d& lever_base_m);
+/// Adds a refused fix; one that does not agree with the streak begins another.
+void extend(RefusedStreak& streak, const MapFix& fix, double highest_speed_mps);
 
-  void apply(Track& track, const CheckedImu& imu) const;
-  FixOutcome apply(Track& track, const MapFix& fix) const;
+/// Refused fixes that agree with each other for so long are believed.
+bool is_believed(const RefusedStreak& streak, double recovery_s);
 
-  /// Position of base_link with covariance as it may be published, order x y z roll pitch yaw about
-  /// the axes of map.
-  Pose pose(const Track& track) const;
-  PoseCovariance pose_covariance(const Track& track) const;
-  /// Velocity and rates in base_link with their covariance.
-  Matrix6d twist_covariance(const Track& track) const;
-  double yaw_sigma_rad(const Track& track) const;
+/// What is common to all accepted fixes.
+void note_accepted(Track& track, const MapFix& fix);
 
-  void change_frame(Track& track,
-                    const Eigen::Matrix3d& R_new_old,
-                    const Eigen::Vector3d& t_new_old) const;
+/// Least variance that is published, by class.
+Eigen::Vector3d floor_variance_m2(const Track& track, const Config& config);
 
- private:
-  void start(Track& track, const CheckedImu& imu) const;
-  void advance(Track& track, Nanoseconds stamp_ns) const;
-  MotionNoise noise(const Track& track) const;
-
-  FixOutcome align(Track& track, const MapFix& fix) const;
-  void begin_running(Track& track, const MapFix& fix, const HeadingEstimate& heading) const;
-  FixOutcome filter_fix(Track& track, const MapFix& fix) const;
-  bool agrees(const RefusedStreak& streak, const MapFix& fix) const;
-  bool extend(RefusedStreak& streak, const MapFix& fix) const;
-  FixOutcome refuse(Track& track,
-                    const MapFix& fix,
-                    const std::string& reason,
-                    const std::string& text) const;
-  void recover(Track& track, const MapFix& fix) const;
-  void recover_height(Track& track, const MapFix& fix) const;
-  void accept(Track& track, const MapFix& fix) const;
-  void hold_correlated(Track& track, const MapFix& fix, double elapsed_s) const;
-  double teleport_limit_m(const Track& track, const MapFix& fix) const;
-  Eigen::Vector3d floor_variance_m2(const Track& track) const;
-
-  Config config_;
-  Eigen::Vector3d lever_base_m_;
-  double gate2_;  ///< chi-square limit, 2 degrees of freedom
-  double gate1_;  ///< 1 degree of freedom
+/// What is published of a Track.
+struct Estimate {
+  Pose T_map_base;
+  /// x y z, roll pitch yaw about the axes of map.
+  PoseCovariance pose_covariance{PoseCovariance::Identity() * kUnknownVariance};
+  Eigen::Vector3d linear_base_mps{Eigen::Vector3d::Zero()};
+  Eigen::Vector3d angular_base_radps{Eigen::Vector3d::Zero()};
+  Matrix6d twist_covariance{Matrix6d::Identity() * kUnknownVariance};
 };
+
+/// Before the heading is known there is no velocity of the body.
+void forget_velocity(Estimate& estimate);
 
 }  // namespace trigpoint::gps_odometry

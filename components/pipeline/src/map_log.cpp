@@ -128,9 +128,13 @@ MapLogResult map_log(recording::LogReader& log,
   result.sweeps_used = cores.lio_status().scans_used;
   result.data_s = to_seconds(session.log().last_ns() - session.log().first_ns());
   result.wall_s = milliseconds_since(start) * 1e-3;
-  exporter::write_run(
-      session.path(file::kRun),
-      {log.summary().path, "offline", options.mode, "ekf15", result.data_s, result.wall_s});
+  exporter::write_run(session.path(file::kRun),
+                      {log.summary().path,
+                       "offline",
+                       options.mode,
+                       configs.gps_odometry.filter,
+                       result.data_s,
+                       result.wall_s});
   session.log().keep_truth(log);
   return result;
 }

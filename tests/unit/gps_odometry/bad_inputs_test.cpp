@@ -8,6 +8,8 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <string>
+#include <tuple>
 
 namespace trigpoint::gps_odometry {
 namespace {
@@ -17,22 +19,26 @@ namespace {
 struct BadFix {
   const char* reason;
   void (*spoil)(GnssFix&);
+  const char* reason_of_eskf18{nullptr};  ///< where it differs
 };
 
-class BadFixes : public testing::TestWithParam<BadFix> {};
+class BadFixes : public testing::TestWithParam<std::tuple<const char*, BadFix>> {};
 
 TEST_P(BadFixes, are_counted_and_leave_the_state_as_it_was) {
-  Driven spoilt;
+  const auto& [filter, bad_fix] = GetParam();
+  const bool other = bad_fix.reason_of_eskf18 != nullptr && std::string(filter) == "eskf18";
+  const char* reason = other ? bad_fix.reason_of_eskf18 : bad_fix.reason;
+  Driven spoilt(filter);
   int bad = 0;
   // Every second fix is bad for ten seconds.
   spoilt.advance(30.0, [&](GnssFix& fix) {
     if ((fix.stamp_ns / 200'000'000) % 2 == 0) {
-      GetParam().spoil(fix);
+      bad_fix.spoil(fix);
       ++bad;
     }
     return true;
   });
-  EXPECT_EQ(count_of(spoilt.status, GetParam().reason), static_cast<std::uint64_t>(bad));
+  EXPECT_EQ(count_of(spoilt.status, reason), static_cast<std::uint64_t>(bad));
   EXPECT_LT(spoilt.error_m(), kRtkTolerance_m);
   EXPECT_EQ(spoilt.status.reset.counter, 1U) << "the one of the first heading";
 }
@@ -40,27 +46,30 @@ TEST_P(BadFixes, are_counted_and_leave_the_state_as_it_was) {
 INSTANTIATE_TEST_SUITE_P(
     TableE,
     BadFixes,
-    testing::Values(
-        BadFix{"not_finite", [](GnssFix& f) { f.latitude_deg = kNaN; }},
-        BadFix{"not_finite",
-               [](GnssFix& f) { f.altitude_m = std::numeric_limits<double>::infinity(); }},
-        BadFix{"covariance_not_finite", [](GnssFix& f) { f.covariance_enu_m2(2, 2) = kNaN; }},
-        BadFix{"covariance_huge", [](GnssFix& f) { f.covariance_enu_m2(0, 0) = 1.7e308; }},
-        BadFix{"used_with_default_covariance", [](GnssFix& f) { f.covariance_enu_m2.setZero(); }},
-        BadFix{"used_with_default_covariance",
-               [](GnssFix& f) { f.covariance_enu_m2(1, 1) = -4.0; }},
-        BadFix{"used_with_diagonal_covariance",
-               [](GnssFix& f) { f.covariance_enu_m2(0, 1) = f.covariance_enu_m2(1, 0) = 5.0; }},
-        BadFix{"out_of_range", [](GnssFix& f) { f.latitude_deg = -2e10; }},
-        BadFix{"out_of_range", [](GnssFix& f) { f.longitude_deg += 360.0; }},
-        BadFix{"zero_position", [](GnssFix& f) { f.latitude_deg = f.longitude_deg = 0.0; }},
-        BadFix{"no_fix", [](GnssFix& f) { f.status = FixStatus::kNoFix; }},
-        BadFix{"stamp_out_of_range",
-               [](GnssFix& f) { f.stamp_ns = std::numeric_limits<Nanoseconds>::min(); }},
-        BadFix{"future_stamp", [](GnssFix& f) { f.stamp_ns += 3600 * kNanosecondsPerSecond; }},
-        BadFix{"too_old", [](GnssFix& f) { f.stamp_ns -= 60 * kNanosecondsPerSecond; }},
-        BadFix{"gate", [](GnssFix& f) { f.latitude_deg += 3.0 / 111'200.0; }},
-        BadFix{"teleport", [](GnssFix& f) { f.latitude_deg += 700.0 / 111'200.0; }}));
+    testing::Combine(
+        testing::Values("ekf15", "eskf18"),
+        testing::Values(
+            BadFix{"not_finite", [](GnssFix& f) { f.latitude_deg = kNaN; }},
+            BadFix{"not_finite",
+                   [](GnssFix& f) { f.altitude_m = std::numeric_limits<double>::infinity(); }},
+            BadFix{"covariance_not_finite", [](GnssFix& f) { f.covariance_enu_m2(2, 2) = kNaN; }},
+            BadFix{"covariance_huge", [](GnssFix& f) { f.covariance_enu_m2(0, 0) = 1.7e308; }},
+            BadFix{"used_with_default_covariance",
+                   [](GnssFix& f) { f.covariance_enu_m2.setZero(); }},
+            BadFix{"used_with_default_covariance",
+                   [](GnssFix& f) { f.covariance_enu_m2(1, 1) = -4.0; }},
+            BadFix{"used_with_diagonal_covariance",
+                   [](GnssFix& f) { f.covariance_enu_m2(0, 1) = f.covariance_enu_m2(1, 0) = 5.0; }},
+            BadFix{"out_of_range", [](GnssFix& f) { f.latitude_deg = -2e10; }},
+            BadFix{"out_of_range", [](GnssFix& f) { f.longitude_deg += 360.0; }},
+            BadFix{"zero_position", [](GnssFix& f) { f.latitude_deg = f.longitude_deg = 0.0; }},
+            BadFix{"no_fix", [](GnssFix& f) { f.status = FixStatus::kNoFix; }},
+            BadFix{"stamp_out_of_range",
+                   [](GnssFix& f) { f.stamp_ns = std::numeric_limits<Nanoseconds>::min(); }},
+            BadFix{"future_stamp", [](GnssFix& f) { f.stamp_ns += 3600 * kNanosecondsPerSecond; }},
+            BadFix{"too_old", [](GnssFix& f) { f.stamp_ns -= 60 * kNanosecondsPerSecond; }},
+            BadFix{"gate", [](GnssFix& f) { f.latitude_deg += 3.0 / 111'200.0; }},
+            BadFix{"teleport", [](GnssFix& f) { f.latitude_deg += 700.0 / 111'200.0; }, "gate"})));
 
 TEST(BadInputs, uses_only_the_horizontal_part_when_the_height_is_off) {
   Driven driven;
@@ -193,8 +202,8 @@ TEST(BadInputs, lets_no_random_input_out_as_anything_but_finite_and_positive) {
     return std::uniform_real_distribution<double>(0.0, 1.0)(random) < p;
   };
   const auto any = [&] { return odd[random() % std::size(odd)]; };
-  for (int round = 0; round < 10; ++round) {
-    Driven driven;
+  for (int round = 0; round < 20; ++round) {
+    Driven driven(round < 10 ? "ekf15" : "eskf18");
     Nanoseconds last_ns = driven.odometry.stamp_ns;
     for (; driven.next < driven.inputs.size() && driven.inputs[driven.next].available_s < 40.0;
          ++driven.next) {

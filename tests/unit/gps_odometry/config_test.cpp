@@ -32,5 +32,16 @@ TEST(Config, refuses_a_datum_that_is_not_a_place) {
   EXPECT_THROW(GpsOdometry(config, RobotConfig{}), ConfigError);
 }
 
+TEST(Config, names_the_filter_that_runs) {
+  for (const char* name : {"ekf15", "eskf18"}) {
+    Config config;
+    config.filter = name;
+    EXPECT_EQ(GpsOdometry(config, RobotConfig{}).status().source, name);
+  }
+  Config config;
+  config.filter = "kalman";
+  EXPECT_THROW(GpsOdometry(config, RobotConfig{}), ConfigError);
+}
+
 }  // namespace
 }  // namespace trigpoint::gps_odometry

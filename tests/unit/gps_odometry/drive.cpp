@@ -60,6 +60,36 @@ Profile town(double speed_mps, double rest_s) {
   return profile;
 }
 
+Profile errands(double speed_mps, double rest_s) {
+  constexpr double kErrand_s = 40.0;
+  constexpr double kStop_s = 4.0;
+  Profile profile = town(1.0, rest_s);
+  const auto turn = profile.yaw_rate_radps;
+  // Share of the speed: up and down at 1 m/s^2, a stop at the end of every errand.
+  const auto share = [=](double t) {
+    const double phase = std::fmod(std::max(t - rest_s, 0.0), kErrand_s);
+    const double left_s = kErrand_s - kStop_s - phase;
+    return std::clamp(std::min(phase, left_s) / speed_mps, 0.0, 1.0);
+  };
+  profile.speed_mps = [=](double t) { return speed_mps * share(t); };
+  profile.yaw_rate_radps = [=](double t) {
+    return share(t) * (turn(t) + 0.08 * std::sin(2.0 * std::numbers::pi * t / 7.0));
+  };
+  return profile;
+}
+
+Profile reverse_start(double speed_mps, double rest_s) {
+  constexpr double kBack_s = 6.0;
+  Profile profile = town(speed_mps, rest_s + kBack_s + 2.0);
+  const auto forward = profile.speed_mps;
+  profile.speed_mps = [=](double t) {
+    const double since = t - rest_s;
+    const double back = std::clamp(std::min(since, kBack_s - since), 0.0, 0.8);
+    return forward(t) - back;
+  };
+  return profile;
+}
+
 Pose Truth::T_map_base() const {
   return {from_yaw(yaw_rad), position_map_m};
 }
@@ -130,18 +160,23 @@ std::vector<Input> sense(const std::vector<Truth>& truth, const Sensors& s, unsi
   const auto fix_every = static_cast<std::size_t>(std::lround(1.0 / (s.fix_hz * kTruthStep_s)));
   Eigen::Vector3d wander = noise(s.wander_sigma_m);
   const double keep = std::exp(-1.0 / (s.fix_hz * s.wander_tau_s));
+  const auto shaken = [&](double sigma, double vibration, bool moves) {
+    return moves ? std::hypot(sigma, vibration) : sigma;
+  };
   for (std::size_t i = 0; i < truth.size(); ++i) {
     const Truth& now = truth[i];
+    const bool moves = std::abs(now.speed_mps) > 0.01;
     if (i % imu_every == 0) {
       Input input;
       input.available_s = now.time_s + 1e-3;
       input.imu.stamp_ns = stamp_of(now.time_s);
       input.imu.gyro_radps = q_imu_base * Eigen::Vector3d(0.0, 0.0, now.yaw_rate_radps) +
-                             s.gyro_bias_radps + noise(s.gyro_noise_radps);
+                             s.gyro_bias_radps +
+                             noise(shaken(s.gyro_noise_radps, s.gyro_vibration_radps, moves));
       input.imu.accel_mps2 =
           q_imu_base *
               Eigen::Vector3d(now.forward_accel_mps2, now.speed_mps * now.yaw_rate_radps, kG) +
-          s.accel_bias_mps2 + noise(s.accel_noise_mps2);
+          s.accel_bias_mps2 + noise(shaken(s.accel_noise_mps2, s.accel_vibration_mps2, moves));
       inputs.push_back(input);
     }
     if (i % fix_every == 0) {
@@ -217,8 +252,9 @@ std::uint64_t count_of(const GpsStatus& status, const std::string& reason) {
   return 0;
 }
 
-Config config_with_datum() {
+Config config_with_datum(const std::string& filter) {
   Config config;
+  config.filter = filter;
   config.use_configured_datum = true;
   config.datum_latitude_deg = test_datum().latitude_deg;
   config.datum_longitude_deg = test_datum().longitude_deg;

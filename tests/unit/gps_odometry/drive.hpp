@@ -10,6 +10,7 @@
 
 #include <functional>
 #include <random>
+#include <string>
 #include <vector>
 
 namespace trigpoint::gps_odometry {
@@ -27,6 +28,12 @@ Profile circle(double speed_mps, double yaw_rate_radps, double rest_s);
 
 /// At rest, then straights of 12 s joined by turns of 90 degrees to either side.
 Profile town(double speed_mps, double rest_s);
+
+/// As town, but with a stop of 4 s after every 36 s, and a gentle slalom on the straights.
+Profile errands(double speed_mps, double rest_s);
+
+/// Backwards out of a parking lot: at rest, 3 s of -0.8 m/s, a stop, then as town.
+Profile reverse_start(double speed_mps, double rest_s);
 
 struct Truth {
   double time_s{0.0};
@@ -48,6 +55,8 @@ struct Sensors {
   double accel_noise_mps2{0.02};
   Eigen::Vector3d gyro_bias_radps{Eigen::Vector3d::Zero()};
   Eigen::Vector3d accel_bias_mps2{Eigen::Vector3d::Zero()};
+  double gyro_vibration_radps{0.0};  ///< more noise while moving
+  double accel_vibration_mps2{0.0};
   double fix_hz{5.0};
   double latency_s{0.12};
   double white_sigma_m{0.010};   ///< horizontal; vertical 1.8 times that
@@ -109,6 +118,6 @@ double rms_m(const std::vector<Sample>& samples, double from_s, double to_s = 1e
 std::uint64_t count_of(const GpsStatus& status, const std::string& reason);
 
 /// Defaults with the test's datum.
-Config config_with_datum();
+Config config_with_datum(const std::string& filter = "ekf15");
 
 }  // namespace trigpoint::gps_odometry

@@ -23,10 +23,10 @@ inline Sensors rtk_robot() {
 
 /// A filter that has driven for 20 s; what it is told then is up to the test.
 struct Driven {
-  Driven()
+  explicit Driven(const std::string& name = "ekf15")
       : truth(drive(town(1.5, 3.0), 60.0)),
         inputs(sense(truth, rtk_robot(), 1)),
-        filter(config_with_datum(), rtk_robot().robot) {
+        filter(config_with_datum(name), rtk_robot().robot) {
     advance(20.0);
   }
 

@@ -70,11 +70,13 @@ GnssFix fix_of(const geodesy::LocalFrame& frame,
   return fix;
 }
 
-Drive drive(const KittiRoute& route, unsigned seed) {
+Drive drive(const KittiRoute& route, const std::string& name, unsigned seed) {
   const geodesy::Geographic& origin = route.places.front();
   const Datum datum{origin.latitude_deg, origin.longitude_deg, origin.height_m, 0};
   const geodesy::LocalFrame frame(datum);
-  GpsOdometry filter(Config{}, RobotConfig{});
+  Config config;
+  config.filter = name;
+  GpsOdometry filter(config, RobotConfig{});
   filter.on_datum(datum);
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal(0.0, kFixSigma_m);
@@ -122,6 +124,7 @@ Drive drive(const KittiRoute& route, unsigned seed) {
 struct Recording {
   const char* number;
   const char* name;
+  const char* filter;
 };
 
 class RealDrive : public testing::TestWithParam<Recording> {};
@@ -131,11 +134,12 @@ TEST_P(RealDrive, stays_on_the_road_and_knows_how_far_it_strayed_in_outages) {
   if (!route) {
     GTEST_SKIP() << "The recorded KITTI routes (kitti_gnss_imu) are not at hand.";
   }
-  const Drive result = drive(*route, 1);
+  const Drive result = drive(*route, GetParam().filter, 1);
   std::printf(
-      "KITTI %s: aided rms %.3f m (worst %.2f, sigma %.2f, inside %.3f), outages of %.0f s rms "
+      "KITTI %s, %s: aided rms %.3f m (worst %.2f, sigma %.2f, inside %.3f), outages of %.0f s rms "
       "%.2f m (worst %.2f, sigma %.2f, inside %.3f), health %d\n",
       GetParam().number,
+      GetParam().filter,
       result.aided.rms_m(),
       result.aided.worst_m,
       result.aided.sigma_m(),
@@ -157,9 +161,12 @@ TEST_P(RealDrive, stays_on_the_road_and_knows_how_far_it_strayed_in_outages) {
 
 INSTANTIATE_TEST_SUITE_P(Kitti,
                          RealDrive,
-                         testing::Values(Recording{"05", "2011_09_30_drive_0018"},
-                                         Recording{"07", "2011_09_30_drive_0027"},
-                                         Recording{"09", "2011_09_30_drive_0033"}));
+                         testing::Values(Recording{"05", "2011_09_30_drive_0018", "ekf15"},
+                                         Recording{"07", "2011_09_30_drive_0027", "ekf15"},
+                                         Recording{"09", "2011_09_30_drive_0033", "ekf15"},
+                                         Recording{"05", "2011_09_30_drive_0018", "eskf18"},
+                                         Recording{"07", "2011_09_30_drive_0027", "eskf18"},
+                                         Recording{"09", "2011_09_30_drive_0033", "eskf18"}));
 
 }  // namespace
 }  // namespace trigpoint::gps_odometry

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
-#include "rewind.hpp"
-
 #include "drive.hpp"
 #include <gtest/gtest.h>
 
@@ -25,8 +23,8 @@ struct End {
   GpsStatus status;
 };
 
-End end_of(const std::vector<Input>& inputs, const Sensors& sensors) {
-  Config config = config_with_datum();
+End end_of(const std::vector<Input>& inputs, const Sensors& sensors, const std::string& name) {
+  Config config = config_with_datum(name);
   config.publish_rate_hz = 1000.0;  // every sample, whatever came before
   GpsOdometry filter(config, sensors.robot);
   End end;
@@ -78,14 +76,17 @@ std::vector<Input> inputs_with(const Sensors& sensors, unsigned seed) {
   return inputs;
 }
 
-TEST(Rewind, gives_with_late_fixes_what_sorted_input_gives) {
+class Rewind : public testing::TestWithParam<std::string> {};
+
+TEST_P(Rewind, gives_with_late_fixes_what_sorted_input_gives) {
   Sensors sensors = rtk_robot();
   sensors.latency_s = 0.3;
   const auto late = inputs_with(sensors, 1);
-  expect_equal(end_of(late, sensors), end_of(sorted_by_stamp(late), sensors));
+  expect_equal(end_of(late, sensors, GetParam()),
+               end_of(sorted_by_stamp(late), sensors, GetParam()));
 }
 
-TEST(Rewind, gives_with_shuffled_fixes_what_sorted_input_gives) {
+TEST_P(Rewind, gives_with_shuffled_fixes_what_sorted_input_gives) {
   Sensors sensors = rtk_robot();
   auto shuffled = inputs_with(sensors, 2);
   std::mt19937_64 random(2);
@@ -98,10 +99,11 @@ TEST(Rewind, gives_with_shuffled_fixes_what_sorted_input_gives) {
   std::stable_sort(shuffled.begin(), shuffled.end(), [](const Input& a, const Input& b) {
     return a.available_s < b.available_s;
   });
-  expect_equal(end_of(shuffled, sensors), end_of(sorted_by_stamp(shuffled), sensors));
+  expect_equal(end_of(shuffled, sensors, GetParam()),
+               end_of(sorted_by_stamp(shuffled), sensors, GetParam()));
 }
 
-TEST(Rewind, is_not_moved_by_duplicates) {
+TEST_P(Rewind, is_not_moved_by_duplicates) {
   const Sensors sensors = rtk_robot();
   const auto inputs = inputs_with(sensors, 3);
   std::vector<Input> doubled;
@@ -111,15 +113,15 @@ TEST(Rewind, is_not_moved_by_duplicates) {
       doubled.push_back(input);
     }
   }
-  const End once = end_of(inputs, sensors);
-  const End twice = end_of(doubled, sensors);
+  const End once = end_of(inputs, sensors, GetParam());
+  const End twice = end_of(doubled, sensors, GetParam());
   expect_equal(twice, once);
   EXPECT_EQ(count_of(twice.status, "duplicate_stamp"), once.status.fixes_received);
 }
 
-TEST(Rewind, refuses_and_counts_a_fix_older_than_the_buffer) {
+TEST_P(Rewind, refuses_and_counts_a_fix_older_than_the_buffer) {
   const Sensors sensors = rtk_robot();
-  GpsOdometry filter(config_with_datum(), sensors.robot);
+  GpsOdometry filter(config_with_datum(GetParam()), sensors.robot);
   for (int i = 0; i < 300; ++i) {
     filter.on_imu(imu_at(0.01 * i));
   }
@@ -128,6 +130,8 @@ TEST(Rewind, refuses_and_counts_a_fix_older_than_the_buffer) {
   EXPECT_EQ(status.fixes_accepted, 0U);
   EXPECT_EQ(filter.on_fix(fix_at({0.0, 0.0, 0.0}, 2.1, 0.014)).status->fixes_accepted, 1U);
 }
+
+INSTANTIATE_TEST_SUITE_P(Filters, Rewind, testing::Values("ekf15", "eskf18"));
 
 }  // namespace
 }  // namespace trigpoint::gps_odometry

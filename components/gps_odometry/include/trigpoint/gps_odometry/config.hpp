@@ -13,8 +13,51 @@ class ConfigFields;
 
 namespace trigpoint::gps_odometry {
 
+/// What eskf18 needs besides the common rules: an inertial navigation system with error states.
+struct Eskf18Config {
+  // IMU: densities, vibration included; saturation; turn-on biases.
+  double gyro_noise_radps_sqrthz{0.0015};
+  double accel_noise_mps2_sqrthz{0.03};
+  double gyro_bias_walk_radps_sqrts{1e-5};
+  double accel_bias_walk_mps2_sqrts{2e-4};
+  double gyro_bias_sigma_radps{0.005};
+  double accel_bias_sigma_mps2{0.08};
+  double gyro_limit_radps{8.7};
+  double accel_limit_mps2{78.0};
+
+  // Fixes: shares of the (scaled) variance, correlation time by class.
+  double fix_slow_share{0.7};
+  double fix_white_share{0.5};
+  double fix_tau_fixed_s{80.0};
+  double fix_tau_float_s{40.0};
+  double fix_tau_code_s{50.0};
+
+  // Fixes that contradict the filter.
+  std::int64_t absorb_fixes{3};
+  double absorb_limit_s{60.0};
+  double suspect_outage_s{3.0};
+  double doubt_hold_s{30.0};
+  double doubt_decay_s{5.0};
+  double better_class_decay_s{20.0};
+
+  // Rest, wheels.
+  bool use_rest{true};
+  double rest_velocity_sigma_mps{0.02};
+  double rest_gyro_sigma_radps{3e-4};
+  double rest_highest_speed_mps{0.3};
+  bool no_side_slip{true};
+  double no_side_slip_sigma_mps{0.1};
+  double no_side_slip_share{0.1};
+  double no_side_slip_interval_s{0.1};
+  double no_side_slip_speed_mps{0.4};
+  double no_side_slip_yaw_sigma_rad{0.35};
+  Eigen::Vector3d no_side_slip_point_base_m{0.0, 0.0, 0.0};
+};
+
 /// The only defaults of gps_odometry; every field is described (unit, rule) in src/config.cpp.
 struct Config {
+  std::string filter{"ekf15"};
+
   // What is published, and when.
   double publish_rate_hz{50.0};
   double dead_reckoning_after_s{1.0};
@@ -68,6 +111,8 @@ struct Config {
   double heading_speed_mps{0.4};
   double heading_converged_rad{0.17};
   double heading_lost_rad{0.8};
+
+  Eskf18Config eskf18;
 };
 
 void describe(Config& config, ConfigFields& fields);

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// Everything in ekf15 that depends on the order of measurements: the filter, the search for
+// heading, the gate and its recovery.
+#pragma once
+
+#include "ekf15.hpp"
+#include "heading.hpp"
+#include "imu_checks.hpp"
+#include "track.hpp"
+#include <Eigen/Core>
+
+#include <string>
+
+namespace trigpoint::gps_odometry {
+
+struct EkfTrack : Track {
+  Ekf15 filter;
+  double gyro_bias_sigma_radps{0.0};
+  HeadingSearch heading;
+
+  /// Variance of GPS error that is common to successive fixes (per axis of map): not seen by the
+  /// filter, added to what is published.
+  Eigen::Vector3d correlated_m2{Eigen::Vector3d::Zero()};
+};
+
+/// The rules by which measurements change a EkfTrack.
+class EkfTracker {
+ public:
+  using State = EkfTrack;
+  static constexpr const char* kSource = "ekf15";
+
+  EkfTracker(const Config& config, const Eigen::Vector3d& lever_base_m);
+
+  void apply(EkfTrack& track, const CheckedImu& imu) const;
+  FixOutcome apply(EkfTrack& track, const MapFix& fix) const;
+
+  /// Position of base_link with covariance as it may be published, order x y z roll pitch yaw about
+  /// the axes of map.
+  Pose pose(const EkfTrack& track) const;
+  PoseCovariance pose_covariance(const EkfTrack& track) const;
+  /// Velocity and rates in base_link with their covariance.
+  Matrix6d twist_covariance(const EkfTrack& track) const;
+  double yaw_sigma_rad(const EkfTrack& track) const;
+  Estimate estimate(const EkfTrack& track) const;
+
+  double speed_mps(const EkfTrack& track) const {
+    return track.filter.x.segment<3>(kVelocity).norm();
+  }
+
+  /// The filter's own reason for health DEGRADED.
+  bool is_doubtful(const EkfTrack& track) const;
+
+  /// Whether an IMU that comes back after this time needs no new start.
+  bool bridges(double) const { return false; }
+
+  void change_frame(EkfTrack& track,
+                    const Eigen::Matrix3d& R_new_old,
+                    const Eigen::Vector3d& t_new_old) const;
+
+ private:
+  void start(EkfTrack& track, const CheckedImu& imu) const;
+  void advance(EkfTrack& track, Nanoseconds stamp_ns) const;
+  MotionNoise noise(const EkfTrack& track) const;
+
+  FixOutcome align(EkfTrack& track, const MapFix& fix) const;
+  void begin_running(EkfTrack& track, const MapFix& fix, const HeadingEstimate& heading) const;
+  FixOutcome filter_fix(EkfTrack& track, const MapFix& fix) const;
+  FixOutcome refuse(EkfTrack& track,
+                    const MapFix& fix,
+                    const std::string& reason,
+                    const std::string& text) const;
+  void recover(EkfTrack& track, const MapFix& fix) const;
+  void recover_height(EkfTrack& track, const MapFix& fix) const;
+  void accept(EkfTrack& track, const MapFix& fix) const;
+  void hold_correlated(EkfTrack& track, const MapFix& fix, double elapsed_s) const;
+  double teleport_limit_m(const EkfTrack& track, const MapFix& fix) const;
+
+  Config config_;
+  Eigen::Vector3d lever_base_m_;
+  double gate2_;  ///< chi-square limit, 2 degrees of freedom
+  double gate1_;  ///< 1 degree of freedom
+};
+
+}  // namespace trigpoint::gps_odometry

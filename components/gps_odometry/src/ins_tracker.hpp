@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// Everything in eskf18 that depends on the order of measurements: strapdown between samples, rest
+// and wheels, heading with its rival, fixes that contradict the filter.
+#pragma once
+
+#include "eskf18.hpp"
+#include "heading.hpp"
+#include "imu_checks.hpp"
+#include "track.hpp"
+#include <Eigen/Core>
+
+#include <array>
+#include <string>
+
+namespace trigpoint::gps_odometry {
+
+/// A fix is judged in two parts: receivers' heights fail more often than their positions.
+enum Part : std::size_t { kHorizontal = 0, kVertical = 1 };
+
+/// What contradicting fixes have led to, of one part.
+struct Contradiction {
+  RefusedStreak streak;
+  bool filter_is_suspect{false};  ///< the streak began after an outage
+  Nanoseconds absorbed_ns{0};  ///< since when the error state holds a jump of the receiver; 0: no
+};
+
+struct InsTrack : Track {
+  Eskf18 filter;
+  ImuMean imu;  ///< the newest sample
+  bool imu_saturated{false};
+  Nanoseconds no_side_slip_ns{0};  ///< of the newest such measurement
+  HeadingSearch heading;
+
+  /// The same with the heading turned round, until the data decide (a start in reverse).
+  Eskf18 rival;
+  bool has_rival{false};
+  double log_ratio{0.0};  ///< of the likelihoods, filter to rival
+
+  Eigen::Vector3d fix_variance_m2{Eigen::Vector3d::Zero()};   ///< of the newest fix; 0: none yet
+  Eigen::Vector3d held_variance_m2{Eigen::Vector3d::Zero()};  ///< peak hold of it
+  std::array<Contradiction, 2> parts;
+  /// Who was right is open: held in what is published (m, per axis of map).
+  Eigen::Vector3d doubt_m{Eigen::Vector3d::Zero()};
+  Nanoseconds doubt_until_ns{0};
+};
+
+/// The rules by which measurements change an InsTrack.
+class InsTracker {
+ public:
+  using State = InsTrack;
+  static constexpr const char* kSource = "eskf18";
+
+  InsTracker(const Config& config, const Eigen::Vector3d& lever_base_m);
+
+  void apply(InsTrack& track, const CheckedImu& imu) const;
+  FixOutcome apply(InsTrack& track, const MapFix& fix) const;
+
+  Estimate estimate(const InsTrack& track) const;
+
+  double speed_mps(const InsTrack& track) const { return track.filter.v_map_mps.norm(); }
+
+  double yaw_sigma_rad(const InsTrack& track) const;
+  bool is_doubtful(const InsTrack& track) const;
+  /// Whether an IMU that comes back after this time needs no new start.
+  bool bridges(double gap_s) const;
+
+  void change_frame(InsTrack& track,
+                    const Eigen::Matrix3d& R_new_old,
+                    const Eigen::Vector3d& t_new_old) const;
+
+ private:
+  /// A fix against the filter: innovation, its covariance by the filter, white covariance.
+  struct Judgement {
+    Eigen::Vector3d innovation_m;
+    Eigen::Matrix3d S_filter_m2;
+    Eigen::Matrix3d R_m2;
+    std::array<double, 2> ratio;  ///< squared Mahalanobis distance over the gate, by part
+
+    Eigen::Matrix3d S_m2() const { return S_filter_m2 + R_m2; }
+  };
+
+  // ins_tracker.cpp: the IMU.
+  void start(InsTrack& track, const CheckedImu& imu) const;
+  InsNoise noise(const InsTrack& track) const;
+  void advance(InsTrack& track, Nanoseconds stamp_ns) const;
+  void step(InsTrack& track, const CheckedImu& imu, double gap_s, bool saturated) const;
+  bool is_saturated(const CheckedImu& imu) const;
+  bool is_at_rest(const InsTrack& track, const QuietWindow& quiet) const;
+  void constrain(InsTrack& track, const CheckedImu& imu) const;
+
+  // ins_fixes.cpp: fixes and heading.
+  FixOutcome align(InsTrack& track, const MapFix& fix) const;
+  FixOutcome refuse_aligning(InsTrack& track, const MapFix& fix, double step_m) const;
+  void begin_running(InsTrack& track, const MapFix& fix, const HeadingEstimate& heading) const;
+  void weigh_rival(InsTrack& track, const MapFix& fix) const;
+  void follow_receiver(InsTrack& track, const MapFix& fix) const;
+  void renew_fix_error(Eskf18& filter, const MapFix& fix, Part part) const;
+  Judgement judge(const Eskf18& filter, const MapFix& fix) const;
+  FixOutcome filter_fix(InsTrack& track, const MapFix& fix) const;
+  bool resolve(InsTrack& track, const MapFix& fix, Part part, const Judgement& judgement) const;
+  bool was_unproven(InsTrack& track,
+                    const MapFix& fix,
+                    Part part,
+                    const Judgement& judgement) const;
+  void absorb(InsTrack& track, const MapFix& fix, Part part, const Judgement& judgement) const;
+  void recover(InsTrack& track, const MapFix& fix, Part part) const;
+  void end_absorptions(InsTrack& track, const MapFix& fix) const;
+  void clip(Judgement& judgement, Part part) const;
+  void hold_doubt(InsTrack& track, const MapFix& fix, const Judgement& judgement) const;
+  void accept(InsTrack& track, const MapFix& fix) const;
+  Eigen::Vector3d doubt_variance_m2(const InsTrack& track) const;
+  Eigen::Vector3d added_variance_m2(const InsTrack& track) const;
+
+  Estimate aligning_estimate(const InsTrack& track) const;
+  double filter_yaw_sigma_rad(const InsTrack& track) const;
+  /// Probability of the rival heading.
+  double rival_share(const InsTrack& track) const;
+
+  template <typename Change>
+  static void for_each(InsTrack& track, const Change& change) {
+    change(track.filter);
+    if (track.has_rival) {
+      change(track.rival);
+    }
+  }
+
+  Config config_;
+  Eigen::Vector3d lever_base_m_;
+  std::array<double, 2> gate_;  ///< chi-square limits, by part
+  double gate_axis_;            ///< 1 degree of freedom
+};
+
+}  // namespace trigpoint::gps_odometry
