@@ -373,6 +373,22 @@ TEST(InsTracker, starts_anew_after_a_gap_of_seven_seconds) {
   EXPECT_EQ(driven.status.health, GpsHealth::kOk);
 }
 
+TEST(InsTracker, levels_and_constrains_again_after_the_imu_clock_went_back) {
+  Driven driven(kIns);
+  for (Input& input : driven.inputs) {
+    const Nanoseconds back_ns = input.available_s > 20.0 ? 3600 * kNanosecondsPerSecond : 0;
+    input.imu.stamp_ns -= back_ns;
+    input.fix.stamp_ns -= back_ns;
+  }
+  driven.advance(45.0);
+  EXPECT_TRUE(has_event(driven.events, "imu_clock_reset"));
+  EXPECT_EQ(driven.status.health, GpsHealth::kOk);
+  const double before = std::sqrt(driven.odometry.pose_covariance(0, 0));
+  driven.advance(55.0, [](GnssFix&) { return false; });
+  // Without the wheels' constraint ten seconds of this IMU are worth more than three metres.
+  EXPECT_LT(std::sqrt(driven.odometry.pose_covariance.diagonal().head<2>().sum()), before + 2.0);
+}
+
 TEST(InsTracker, doubts_its_state_while_the_gyro_is_at_its_limit) {
   const auto sigma_after = [](double limit_radps) {
     Config config = config_with_datum(kIns);
