@@ -63,6 +63,10 @@ void InsTracker::start(InsTrack& track, const CheckedImu& imu) const {
       Vector3d::Ones();
   track.filter.P = sigma.cwiseAbs2().asDiagonal();
   track.heading.restart();
+  // The IMU's clock may have moved: what was stamped before says nothing any more.
+  track.no_side_slip_ns = track.doubt_until_ns = 0;
+  track.parts = {};
+  track.doubt_m.setZero();
 }
 
 InsNoise InsTracker::noise(const InsTrack& track) const {

@@ -269,6 +269,22 @@ TEST(InsTracker, follows_a_jump_that_stays_and_says_so) {
   EXPECT_NEAR(announced->reset.delta.p.y(), 20.0, 1.0);
 }
 
+TEST(InsTracker, corrects_a_wrong_fix_at_once_while_the_fix_is_not_proven) {
+  const auto truth = drive(errands(1.5, 3.0), 80.0);
+  auto inputs = sense(truth, cheap_robot(1), 1);
+  for (Input& input : inputs) {
+    const double time_s = to_seconds(input.fix.stamp_ns - kEpoch_ns);
+    if (input.is_fix && time_s > 40.0 && time_s < 60.0) {  // float
+      input.fix.latitude_deg += 0.4 / kMetresPerDegree;
+      input.fix.covariance_enu_m2 = 0.09 * Eigen::Matrix3d::Identity();
+    } else if (input.is_fix && time_s > 60.0 && time_s < 70.0) {  // fixed wrongly
+      input.fix.latitude_deg += 1.0 / kMetresPerDegree;
+    }
+  }
+  const Faulty faulty = run_with(inputs, truth);
+  EXPECT_LT(rms_m(faulty.result.samples, 71.0), 0.1);
+}
+
 TEST(InsTracker, uses_the_horizontal_part_when_the_height_is_off) {
   Driven driven(kIns);
   driven.advance(20.35, [](GnssFix& fix) {
@@ -329,6 +345,27 @@ TEST(InsTracker, does_not_believe_in_rolling_wheels_when_told_so) {
 
 // ---- the IMU ------------------------------------------------------------------------------------
 
+TEST(InsTracker, integrates_between_samples_by_the_trapezoid_rule_also_where_fixes_come_between) {
+  // A rate that grows by 0.2 rad/s^2, sampled at 20 Hz: the trapezoid is exact, 0.1 t^2.
+  constexpr double kExact_rad = 1e-6;
+  const InsTracker tracker(config_with_datum(kIns), {0.35, 0.15, 0.6});
+  InsTrack track;
+  for (int i = 0; i <= 100; ++i) {
+    const double time_s = 0.05 * i;
+    CheckedImu imu;
+    imu.stamp_ns = stamp_of(time_s);
+    imu.raw_gyro_radps = {0.0, 0.0, 0.2 * time_s};
+    imu.accel_mps2 = imu.mean_accel_mps2 = {0.0, 0.0, 9.80665};
+    tracker.apply(track, imu);
+    if (i % 4 == 1) {
+      MapFix fix;
+      fix.checked.stamp_ns = stamp_of(time_s + 0.037);
+      tracker.apply(track, fix);
+    }
+  }
+  EXPECT_NEAR(yaw(track.filter), 2.5, kExact_rad);
+}
+
 void drop_imu(Driven& driven, double from_s, double to_s) {
   std::erase_if(driven.inputs, [&](const Input& input) {
     return input.available_s > from_s && input.available_s < to_s;
@@ -371,6 +408,22 @@ TEST(InsTracker, starts_anew_after_a_gap_of_seven_seconds) {
   driven.advance(50.0);
   EXPECT_LT(driven.error_m(), kRtkTolerance_m);
   EXPECT_EQ(driven.status.health, GpsHealth::kOk);
+}
+
+TEST(InsTracker, levels_and_constrains_again_after_the_imu_clock_went_back) {
+  Driven driven(kIns);
+  for (Input& input : driven.inputs) {
+    const Nanoseconds back_ns = input.available_s > 20.0 ? 3600 * kNanosecondsPerSecond : 0;
+    input.imu.stamp_ns -= back_ns;
+    input.fix.stamp_ns -= back_ns;
+  }
+  driven.advance(45.0);
+  EXPECT_TRUE(has_event(driven.events, "imu_clock_reset"));
+  EXPECT_EQ(driven.status.health, GpsHealth::kOk);
+  const double before = std::sqrt(driven.odometry.pose_covariance(0, 0));
+  driven.advance(55.0, [](GnssFix&) { return false; });
+  // Without the wheels' constraint ten seconds of this IMU are worth more than three metres.
+  EXPECT_LT(std::sqrt(driven.odometry.pose_covariance.diagonal().head<2>().sum()), before + 2.0);
 }
 
 TEST(InsTracker, doubts_its_state_while_the_gyro_is_at_its_limit) {
