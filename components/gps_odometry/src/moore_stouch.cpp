@@ -105,14 +105,18 @@ void initialise(MooreStouch& filter,
                 const Vector15d& z,
                 const Matrix15d& R,
                 const MeasuredStates& measured) {
-  std::vector<int> states;
+  // By element: with index lists on both sides g++ 12 warns falsely (-Wfree-nonheap-object).
   for (int i = 0; i < 15; ++i) {
-    if (measured[static_cast<std::size_t>(i)]) {
-      states.push_back(i);
+    if (!measured[static_cast<std::size_t>(i)]) {
+      continue;
+    }
+    filter.x(i) = z(i);
+    for (int j = 0; j < 15; ++j) {
+      if (measured[static_cast<std::size_t>(j)]) {
+        filter.P(i, j) = R(i, j);
+      }
     }
   }
-  filter.x(states) = z(states);
-  filter.P(states, states) = R(states, states);
   filter.initialised = true;
 }
 
