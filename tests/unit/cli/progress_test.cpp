@@ -2,7 +2,6 @@
 // Copyright the Trigpoint developers
 #include "progress.hpp"
 
-#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <pty.h>
@@ -12,6 +11,7 @@
 #include <array>
 #include <functional>
 #include <string>
+#include <thread>
 
 namespace trigpoint::cli {
 namespace {
@@ -32,18 +32,22 @@ std::string shown_by(const std::function<void()>& work) {
   if (openpty(&ours, &theirs, nullptr, nullptr, nullptr) != 0) {
     return "no terminal to be had";
   }
+  // Read all the while: a terminal that nobody reads stops its writer. It ends with its last
+  // writer.
+  std::string text;
+  std::thread reader([&text, ours] {
+    std::array<char, 4096> part{};
+    for (ssize_t n = 0; (n = read(ours, part.data(), part.size())) > 0;) {
+      text.append(part.data(), static_cast<std::size_t>(n));
+    }
+  });
   const int before = dup(STDERR_FILENO);
   dup2(theirs, STDERR_FILENO);
+  close(theirs);
   work();
   dup2(before, STDERR_FILENO);
   close(before);
-  fcntl(ours, F_SETFL, O_NONBLOCK);
-  std::string text;
-  std::array<char, 4096> part{};
-  for (ssize_t n = 0; (n = read(ours, part.data(), part.size())) > 0;) {
-    text.append(part.data(), static_cast<std::size_t>(n));
-  }
-  close(theirs);
+  reader.join();
   close(ours);
   return text;
 }
