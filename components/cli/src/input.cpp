@@ -94,7 +94,11 @@ Input open_scenario(const InputOptions& options, const std::string& truth_file) 
 
 /// The folder made by `trigpoint simulate` that `path` is or lies in (as its log/), if so.
 std::optional<fs::path> simulated_drive_of(const fs::path& path) {
-  for (const fs::path& folder : {path, fs::absolute(path).lexically_normal().parent_path()}) {
+  fs::path plain = fs::absolute(path).lexically_normal();
+  if (!plain.has_filename()) {
+    plain = plain.parent_path();  // "log/" as a shell completes it
+  }
+  for (const fs::path& folder : {plain, plain.parent_path()}) {
     if (is_simulated_drive(folder)) {
       return folder;
     }
@@ -148,7 +152,8 @@ void add_input_options(CLI::App& verb, InputOptions& options) {
   add_config_options(verb, options);
   verb.add_option("--seed", options.seed, "of the world and the noise, when LOG is a scenario")
       ->capture_default_str();
-  verb.add_option("--duration", options.duration_s, "use only this much of the log, s");
+  verb.add_option("--duration", options.duration_s, "use only this much of the log, s")
+      ->check(CLI::NonNegativeNumber);
 }
 
 Input open_input(const InputOptions& options, const std::string& truth_file) {

@@ -20,6 +20,9 @@ void describe_log(recording::LogOptions& log, ConfigFields& fields) {
                 log.lead_in_s,
                 "KITTI: IMU and fixes from this long before the first sweep",
                 kNotNegative);
+  fields.number("elevation_correction_rad",
+                log.elevation_correction_rad,
+                "KITTI: its beams' elevation angles are too low by this much");
 }
 
 }  // namespace

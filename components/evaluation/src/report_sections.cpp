@@ -2,6 +2,9 @@
 // Copyright the Trigpoint developers
 #include "report_sections.hpp"
 
+#include "trigpoint/evaluation/plane_thickness.hpp"
+#include "trigpoint/export/map.hpp"
+
 #include "table.hpp"
 
 #include <algorithm>
@@ -82,6 +85,27 @@ std::string points_of(const std::string& pcd) {
     }
   }
   return "an unknown number of";
+}
+
+std::string thickness_text(const std::string& pcd) {
+  PlaneThickness found;
+  try {
+    found = facade_thickness(exporter::read_pcd(pcd));
+  } catch (const std::exception& error) {
+    return "Thickness of facades: " + std::string(error.what()) + ".\n";
+  }
+  if (found.planes == 0) {
+    return "Thickness of facades: there is no upright plane to measure.\n";
+  }
+  return "Thickness of facades (one sigma across upright planes: half the width of the middle 68 % "
+         "of their points): median " +
+         fixed(found.median_m, 3) + " m, 90th percentile " + fixed(found.p90_m, 3) + " m, " +
+         std::to_string(found.planes) + " planes in " + std::to_string(found.cells) +
+         " cells of 2 m" +
+         (found.share_looked_at < 1.0
+              ? ", a sample of " + share(found.share_looked_at) + " of the map"
+              : "") +
+         ".\n";
 }
 
 }  // namespace
@@ -188,7 +212,7 @@ std::string print_map(const SessionData& data) {
          fixed(static_cast<double>(bytes) * 1e-6, 1) + " MB. " +
          (data.alignment ? "Placed with the alignment above"
                          : "Without an alignment, so its frame is odom") +
-         ".\n";
+         ".\n\n" + thickness_text(map);
 }
 
 }  // namespace trigpoint::evaluation

@@ -26,7 +26,9 @@ class Pace {
       done = status.scans_received;  // it collects sweeps until it knows where odom begins
     }
     tell([&] {
-      sweeps_.heard(done);
+      // `done` itself steps back when the collected sweeps begin to be worked off.
+      sweeps_.heard(done, status.scans_received < scans_received_);
+      scans_received_ = status.scans_received;
       imu_.heard(status.imu_received);
     });
   }
@@ -67,8 +69,10 @@ class Pace {
  private:
   /// A counter of another program, which starts anew when that program does.
   struct Answers {
-    void heard(std::uint64_t count) {
-      if (count < newest_) {
+    void heard(std::uint64_t count) { heard(count, count < newest_); }
+
+    void heard(std::uint64_t count, bool started_anew) {
+      if (started_anew) {
         before_ += newest_;
       }
       newest_ = count;
@@ -76,7 +80,11 @@ class Pace {
 
     void begin() { base_ = before_ + newest_; }
 
-    std::uint64_t answered() const { return before_ + newest_ - base_; }
+    /// Not below zero: what was answered before the first message may step back, too.
+    std::uint64_t answered() const {
+      const std::uint64_t all = before_ + newest_;
+      return all > base_ ? all - base_ : 0;
+    }
 
     std::uint64_t before_{0};
     std::uint64_t newest_{0};
@@ -103,6 +111,7 @@ class Pace {
   Answers sweeps_;
   Answers fixes_;
   Answers imu_;
+  std::uint64_t scans_received_{0};
   Nanoseconds verdict_ns_{0};
 };
 

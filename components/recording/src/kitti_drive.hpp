@@ -50,7 +50,8 @@ KittiDrive load_kitti_drive(const std::filesystem::path& sync_folder);
 std::optional<Nanoseconds> parse_kitti_stamp(const std::string& text);
 
 /// Reads the points and adds their times (see kitti_point_time_s).
-PointCloudMessage load_kitti_sweep(const KittiSweep& sweep);
+/// Every beam is turned upwards by `elevation_correction_rad` in its own vertical plane.
+PointCloudMessage load_kitti_sweep(const KittiSweep& sweep, double elevation_correction_rad = 0.0);
 
 /// Seconds after the sweep's start at which a point in direction (x, y) of the LiDAR was measured.
 /// The scanner turns clockwise seen from above, and a sweep is cut at the rear: azimuth +180

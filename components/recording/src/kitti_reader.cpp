@@ -22,7 +22,8 @@ struct Arrival {
 
 class KittiReader : public LogReader {
  public:
-  KittiReader(KittiDrive drive, const LogOptions& options) : drive_(std::move(drive)) {
+  KittiReader(KittiDrive drive, const LogOptions& options)
+      : drive_(std::move(drive)), elevation_correction_rad_(options.elevation_correction_rad) {
     list_arrivals(options);
     summarize();
   }
@@ -44,7 +45,8 @@ class KittiReader : public LogReader {
         entry.measurement = drive_.fixes[arrival.index];
         break;
       case Arrival::Kind::kSweep:
-        entry.measurement = load_kitti_sweep(drive_.sweeps[arrival.index]);
+        entry.measurement =
+            load_kitti_sweep(drive_.sweeps[arrival.index], elevation_correction_rad_);
         break;
     }
     return entry;
@@ -111,6 +113,7 @@ class KittiReader : public LogReader {
   }
 
   KittiDrive drive_;
+  double elevation_correction_rad_;
   LogSummary summary_;
   std::vector<Arrival> arrivals_;
   std::size_t next_{0};

@@ -4,6 +4,7 @@
 
 #include "kitti_drive.hpp"
 
+#include <cmath>
 #include <cstring>
 #include <fstream>
 
@@ -43,9 +44,23 @@ PointCloudMessage empty_cloud(const KittiSweep& sweep) {
   return cloud;
 }
 
+/// (horizontal distance, z) turned by the angle; the azimuth stays. On the axis there is no azimuth
+/// to turn along.
+void raise(float* xyz_m, double angle_rad) {
+  const double horizontal_m = std::hypot(xyz_m[0], xyz_m[1]);
+  if (angle_rad == 0.0 || horizontal_m == 0.0) {
+    return;
+  }
+  const double z_m = xyz_m[2];
+  const double scale = std::cos(angle_rad) - std::sin(angle_rad) * z_m / horizontal_m;
+  xyz_m[0] = static_cast<float>(scale * xyz_m[0]);
+  xyz_m[1] = static_cast<float>(scale * xyz_m[1]);
+  xyz_m[2] = static_cast<float>(std::sin(angle_rad) * horizontal_m + std::cos(angle_rad) * z_m);
+}
+
 }  // namespace
 
-PointCloudMessage load_kitti_sweep(const KittiSweep& sweep) {
+PointCloudMessage load_kitti_sweep(const KittiSweep& sweep, double elevation_correction_rad) {
   const auto bytes = read_bytes(sweep.file);
   const std::size_t points = bytes.size() / kFileStep;
   const double duration_s = to_seconds(sweep.end_ns - sweep.start_ns);
@@ -57,6 +72,7 @@ PointCloudMessage load_kitti_sweep(const KittiSweep& sweep) {
     float values[5];
     std::memcpy(values, bytes.data() + i * kFileStep, kFileStep);
     values[4] = kitti_point_time_s(values[0], values[1], duration_s);
+    raise(values, elevation_correction_rad);
     std::memcpy(cloud.data.data() + i * kCloudStep, values, kCloudStep);
   }
   return cloud;

@@ -2,6 +2,7 @@
 // Copyright the Trigpoint developers
 #include "trigpoint/evaluation/report.hpp"
 
+#include "trigpoint/export/map.hpp"
 #include "trigpoint/export/session.hpp"
 
 #include "../export/scratch_folder.hpp"
@@ -164,6 +165,18 @@ TEST(Report, prints_the_alignments_sigma_also_when_it_is_not_admitted) {
               AllOf(HasSubstr("Not admitted"),
                     HasSubstr("yaw sigma too large"),
                     HasSubstr("yaw 0.115 deg, east 0.050 m, north 0.040 m, up 0.100 m")));
+}
+
+TEST(Report, tells_how_thick_the_maps_facades_are) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  // The made walls have no noise; that their road bends is less than 1 cm in a cell.
+  EXPECT_THAT(write_report(folder.path(), kNoPictures).text,
+              testing::ContainsRegex("## Map\n\n[^#]*Thickness of facades [^:]*: half[^:]*: median "
+                                     "0.00[0-9] m, 90th percentile 0.0[0-9]+ m, [0-9]+ planes"));
+  exporter::write_pcd(folder.file("map.pcd"), {{1.0F, 2.0F, 3.0F, 0.0F}});
+  EXPECT_THAT(write_report(folder.path(), kNoPictures).text,
+              HasSubstr("there is no upright plane to measure"));
 }
 
 TEST(Report, says_that_all_messages_were_used) {

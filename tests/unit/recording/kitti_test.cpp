@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <numbers>
@@ -89,6 +90,20 @@ TEST(KittiDrive, takes_only_sweeps_whose_points_are_there) {
   const auto clouds = only<PointCloudMessage>(entries);
   ASSERT_EQ(2U, clouds.size());
   EXPECT_EQ(200 * kMillisecond_ns, clouds[1].stamp_ns - clouds[0].stamp_ns);
+}
+
+TEST(KittiDrive, turns_beams_upwards_when_their_elevation_is_known_to_be_too_low) {
+  SmallDrive drive;
+  LogOptions options;
+  options.elevation_correction_rad = 0.01;
+  const auto clouds = only<PointCloudMessage>(read_all(*open_log(drive.path(), {}, options)));
+  float raised[3];
+  std::memcpy(raised, clouds.at(0).data.data(), sizeof(raised));
+  // The point (5, 0, 1): its range and azimuth stay, its elevation grows.
+  constexpr double kRounding = 1e-6;
+  EXPECT_NEAR(std::hypot(5.0, 1.0), std::hypot(raised[0], raised[2]), kRounding);
+  EXPECT_NEAR(std::atan2(1.0, 5.0) + 0.01, std::atan2(raised[2], raised[0]), kRounding);
+  EXPECT_EQ(0.0F, raised[1]);
 }
 
 TEST(KittiDrive, reads_the_right_fields_of_the_oxts) {

@@ -75,6 +75,8 @@ struct LogOptions {
   double duration_s{0.0};         ///< then deliver this much; 0 = to the end
   /// KITTI only: IMU and fixes are delivered from this long before the first sweep, s.
   double lead_in_s{3.0};
+  /// KITTI only: every beam is turned upwards by this angle, rad (README, "Elevation angles").
+  double elevation_correction_rad{0.0};
 };
 
 /// Opens a ROS 1 bag (.bag), a rosbag2 folder or .db3 file, or a KITTI raw drive folder. Throws

@@ -1,0 +1,264 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "trigpoint/evaluation/plane_thickness.hpp"
+
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <random>
+#include <vector>
+
+namespace trigpoint::evaluation {
+
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kCell_m = 2.0;
+/// A cell also sees the points this far outside (in x and y), so that no border cuts a wall along
+/// its face.
+constexpr double kMargin_m = 0.5;
+/// A point counts as upright when its column of this side reaches kColumnHeight_m in the cell:
+/// ground, roofs and bonnets do not.
+constexpr double kColumn_m = 0.2;
+constexpr double kColumnHeight_m = 0.5;
+constexpr int kTrials = 60;
+constexpr int kMostFits = 20;
+/// Two points nearer than this do not tell a wall's direction.
+constexpr double kLeastBase_m = 0.5;
+/// Of points that the plane is fitted to; beyond it lies what makes the wall thick.
+constexpr double kInlier_m = 0.1;
+/// What lies further away is something else.
+constexpr double kWindow_m = 0.4;
+constexpr std::size_t kLeastPoints = 100;
+/// Of the points within the window, inliers must be at least this share. They are half of two equal
+/// copies of a wall, but a quarter of clutter that fills the window evenly.
+constexpr double kLeastInliers = 0.45;
+constexpr double kMostTilt = 0.17;  // |n_z|: 10 degrees
+constexpr double kLeastLength_m = 1.0;
+constexpr double kLeastHeight_m = 1.5;
+/// Between these ranks lies +-1 sigma of a normal distribution.
+constexpr double kLowRank = 0.158655;
+constexpr double kHighRank = 0.841345;
+
+using CellKey = std::array<std::int32_t, 3>;
+using Points = std::vector<Vector3d>;
+
+std::int32_t index_of(double x_m, double side_m) {
+  return static_cast<std::int32_t>(std::floor(x_m / side_m));
+}
+
+/// Evenly spread over 64 bits (finaliser of splitmix64, S. Vigna).
+std::uint64_t hash_of(const CellKey& key) {
+  std::uint64_t h = 0;
+  for (const std::int32_t i : key) {
+    h = (h ^ static_cast<std::uint32_t>(i)) + 0x9E3779B97F4A7C15ULL;
+    h = (h ^ (h >> 30U)) * 0xBF58476D1CE4E5B9ULL;
+    h = (h ^ (h >> 27U)) * 0x94D049BB133111EBULL;
+    h ^= h >> 31U;
+  }
+  return h;
+}
+
+/// The given rank of unsorted values, which are reordered.
+double at_rank(std::vector<double>& values, double rank) {
+  const auto at = values.begin() +
+                  static_cast<std::ptrdiff_t>(rank * static_cast<double>(values.size() - 1) + 0.5);
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+std::map<CellKey, Points> fill_cells(const PointCloud& cloud, double share) {
+  constexpr double kFar_m = 1e7;  // an index of that size still fits
+  const auto limit = static_cast<std::uint64_t>(share * 0x1p63);
+  std::map<CellKey, Points> cells;
+  for (const PointXyzi& point : cloud) {
+    const Vector3d p = point.position().cast<double>();
+    if (!p.allFinite() || p.cwiseAbs().maxCoeff() > kFar_m) {
+      continue;
+    }
+    const std::int32_t k = index_of(p.z(), kCell_m);
+    for (std::int32_t i = index_of(p.x() - kMargin_m, kCell_m);
+         i <= index_of(p.x() + kMargin_m, kCell_m);
+         ++i) {
+      for (std::int32_t j = index_of(p.y() - kMargin_m, kCell_m);
+           j <= index_of(p.y() + kMargin_m, kCell_m);
+           ++j) {
+        const CellKey key{i, j, k};
+        if (share >= 1.0 || (hash_of(key) >> 1U) < limit) {
+          cells[key].push_back(p);
+        }
+      }
+    }
+  }
+  return cells;
+}
+
+/// Only points that stand above or below others.
+Points upright(const Points& points) {
+  struct Range {
+    double lowest_m{1e9};
+    double highest_m{-1e9};
+  };
+
+  const auto column_of = [](const Vector3d& p) {
+    return std::array{index_of(p.x(), kColumn_m), index_of(p.y(), kColumn_m)};
+  };
+  std::map<std::array<std::int32_t, 2>, Range> columns;
+  for (const Vector3d& p : points) {
+    Range& range = columns[column_of(p)];
+    range.lowest_m = std::min(range.lowest_m, p.z());
+    range.highest_m = std::max(range.highest_m, p.z());
+  }
+  Points kept;
+  std::copy_if(points.begin(), points.end(), std::back_inserter(kept), [&](const Vector3d& p) {
+    const Range& range = columns[column_of(p)];
+    return range.highest_m - range.lowest_m >= kColumnHeight_m;
+  });
+  return kept;
+}
+
+struct Plane {
+  Vector3d normal;
+  Vector3d centre_m;
+
+  double distance_m(const Vector3d& p) const { return normal.dot(p - centre_m); }
+};
+
+Points near_to(const Plane& plane, const Points& points, double distance_m) {
+  Points near;
+  std::copy_if(points.begin(), points.end(), std::back_inserter(near), [&](const Vector3d& p) {
+    return std::abs(plane.distance_m(p)) <= distance_m;
+  });
+  return near;
+}
+
+/// The vertical plane through two of the points that has most of them near it; a point counts by
+/// 1 - (d / kInlier_m)^2 (MSAC, P. Torr, A. Zisserman, CVIU 78(1), 2000), so that a plane askew
+/// between two copies of a wall does not win against one of them.
+std::optional<Plane> vote(const Points& points) {
+  std::mt19937 random(1);  // seeded alike for every cell: its result depends on its points only
+  std::optional<Plane> best;
+  double most = 0.0;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const Vector3d& a = points[random() % points.size()];
+    const Vector3d& b = points[random() % points.size()];
+    const Vector3d along = (b - a).cwiseProduct(Vector3d(1.0, 1.0, 0.0));
+    if (along.norm() < kLeastBase_m) {
+      continue;
+    }
+    const Plane plane{along.cross(Vector3d::UnitZ()).normalized(), a};
+    double votes = 0.0;
+    for (const Vector3d& p : points) {
+      const double d = plane.distance_m(p) / kInlier_m;
+      votes += std::max(0.0, 1.0 - d * d);
+    }
+    if (votes > most) {
+      most = votes;
+      best = plane;
+    }
+  }
+  return best;
+}
+
+Plane fit(const Points& points) {
+  Vector3d mean = Vector3d::Zero();
+  for (const Vector3d& p : points) {
+    mean += p / static_cast<double>(points.size());
+  }
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (const Vector3d& p : points) {
+    scatter += (p - mean) * (p - mean).transpose();
+  }
+  return {Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvectors().col(0), mean};
+}
+
+/// The plane of its own inliers, from the best vote on.
+std::optional<Plane> find_plane(const Points& points) {
+  std::optional<Plane> plane = vote(points);
+  std::size_t before = 0;
+  for (int i = 0; plane && i < kMostFits; ++i) {
+    const Points inliers = near_to(*plane, points, kInlier_m);
+    if (inliers.size() < 3) {
+      return std::nullopt;
+    }
+    if (inliers.size() == before) {
+      break;
+    }
+    before = inliers.size();
+    plane = fit(inliers);
+  }
+  return plane;
+}
+
+/// Between the 5th and the 95th of a hundred points, along `direction`.
+double extent_m(const Points& points, const Vector3d& direction) {
+  std::vector<double> along;
+  std::transform(points.begin(), points.end(), std::back_inserter(along), [&](const Vector3d& p) {
+    return direction.dot(p);
+  });
+  const double low = at_rank(along, 0.05);
+  return at_rank(along, 0.95) - low;
+}
+
+bool is_facade(const Plane& plane, const Points& inliers, const Points& window) {
+  const Vector3d along = plane.normal.cross(Vector3d::UnitZ()).normalized();
+  return window.size() >= kLeastPoints && std::abs(plane.normal.z()) <= kMostTilt &&
+         static_cast<double>(inliers.size()) >=
+             kLeastInliers * static_cast<double>(window.size()) &&
+         extent_m(inliers, along) >= kLeastLength_m &&
+         extent_m(inliers, Vector3d::UnitZ()) >= kLeastHeight_m;
+}
+
+/// The wall's thickness; nullopt when the cell holds none, or holds it only as a neighbour's.
+std::optional<double> thickness_in(const CellKey& key, const Points& points) {
+  const std::optional<Plane> plane = find_plane(points);
+  if (!plane || index_of(plane->centre_m.x(), kCell_m) != key[0] ||
+      index_of(plane->centre_m.y(), kCell_m) != key[1]) {
+    return std::nullopt;
+  }
+  const Points window = near_to(*plane, points, kWindow_m);
+  if (!is_facade(*plane, near_to(*plane, points, kInlier_m), window)) {
+    return std::nullopt;
+  }
+  std::vector<double> distances_m;
+  for (const Vector3d& p : window) {
+    distances_m.push_back(plane->distance_m(p));
+  }
+  const double low = at_rank(distances_m, kLowRank);
+  return 0.5 * (at_rank(distances_m, kHighRank) - low);
+}
+
+}  // namespace
+
+PlaneThickness facade_thickness(const PointCloud& cloud, const PlaneThicknessOptions& options) {
+  PlaneThickness result;
+  if (cloud.size() > options.most_points) {
+    result.share_looked_at =
+        static_cast<double>(options.most_points) / static_cast<double>(cloud.size());
+  }
+  std::vector<double> thicknesses_m;
+  for (const auto& [key, points] : fill_cells(cloud, result.share_looked_at)) {
+    const Points standing = upright(points);
+    if (standing.size() < kLeastPoints) {
+      continue;
+    }
+    ++result.cells;
+    if (const auto thickness = thickness_in(key, standing)) {
+      thicknesses_m.push_back(*thickness);
+    }
+  }
+  result.planes = thicknesses_m.size();
+  if (result.planes > 0) {
+    result.median_m = at_rank(thicknesses_m, 0.5);
+    result.p90_m = at_rank(thicknesses_m, 0.9);
+  }
+  return result;
+}
+
+}  // namespace trigpoint::evaluation
