@@ -49,6 +49,10 @@ void describe(AlignmentConfig& config, ConfigFields& fields) {
                 config.lio_drift_m_per_sqrt_m,
                 "sigma of LIO's drift per axis is this times the square root of the distance",
                 kNotNegative);
+  fields.number("lio_tilt_sigma_rad",
+                config.lio_tilt_sigma_rad,
+                "sigma of odom's roll and of its pitch against gravity",
+                kNotNegative);
   fields.number("residual_tolerance",
                 config.residual_tolerance,
                 "residual's chi-square over its 99.9 % quantile, at most; what exceeds 1 per "

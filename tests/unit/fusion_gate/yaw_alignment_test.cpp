@@ -43,8 +43,16 @@ std::vector<AlignmentPair> drive_pairs(const Drive& drive, const YawPose& T_map_
   return pairs;
 }
 
+/// Turns odom about the newest pair.
+void tilt_odom(std::vector<AlignmentPair>& pairs, const Eigen::Vector3d& tilt_rad) {
+  const Eigen::Vector3d newest_m = pairs.back().p_odom_m;
+  for (AlignmentPair& pair : pairs) {
+    pair.p_odom_m = newest_m + so3_exp(tilt_rad) * (pair.p_odom_m - newest_m);
+  }
+}
+
 /// Adds what the configuration says GPS errors are: a Gauss-Markov and a white part; and LIO's
-/// walk.
+/// walk and tilt.
 void add_errors(std::vector<AlignmentPair>& pairs, const AlignmentConfig& config, unsigned seed) {
   std::mt19937 generator(seed);
   std::normal_distribution<double> normal;
@@ -66,6 +74,8 @@ void add_errors(std::vector<AlignmentPair>& pairs, const AlignmentConfig& config
                                              std::sqrt(config.white_share) * sample());
     pairs[k].p_odom_m += walk_m;
   }
+  const Eigen::Vector3d tilt_rad = config.lio_tilt_sigma_rad * sample();
+  tilt_odom(pairs, {tilt_rad.x(), tilt_rad.y(), 0.0});
 }
 
 TEST(YawAlignment, recovers_a_170_degree_yaw_from_noise_free_pairs) {
@@ -231,6 +241,23 @@ TEST(YawAlignment, gives_the_covariance_of_a_hand_made_case) {
   EXPECT_NEAR(solution.covariance(0, 0), 0.04 / sum_m2, 1e-7);
   EXPECT_NEAR(solution.covariance(1, 1), 0.04 / 11.0, 1e-7);
   EXPECT_NEAR(solution.covariance(0, 1), 0.0, 1e-9);
+}
+
+TEST(YawAlignment, a_tilted_odom_costs_little_height_where_the_robot_is) {
+  const auto height_error_m = [](double modelled_sigma_rad) {
+    AlignmentConfig config;
+    config.lio_tilt_sigma_rad = modelled_sigma_rad;
+    Drive coarse;  // with fine fixes the walk of LIO forgets old pairs, and hides the tilt
+    coarse.sigma_m = 0.5;
+    std::vector<AlignmentPair> pairs = drive_pairs(coarse, kTruth);
+    tilt_odom(pairs, {0.02, -0.01, 0.0});
+    const AlignmentSolution solution = solve_alignment(pairs, config).value();
+    return std::abs(
+        (solution.T_map_odom.pose() * pairs.back().p_odom_m - pairs.back().p_map_m).z());
+  };
+  const double unmodelled_m = height_error_m(0.0);
+  EXPECT_GT(unmodelled_m, 0.1);
+  EXPECT_LT(height_error_m(0.02), 0.5 * unmodelled_m);
 }
 
 TEST(YawAlignment, returns_nothing_without_pairs_or_with_nan) {

@@ -103,8 +103,19 @@ double drift_variance(const AlignmentPair& pair, double now_m, const AlignmentCo
 
 using Covariances = std::array<Eigen::MatrixXd, 3>;  // of the residuals, one an axis of map
 
+/// Covariance of the height errors that an unknown tilt of odom gives two pairs. It turns about the
+/// newest pair, so that the solution is right where the robot is.
+double tilt_covariance_m2(const AlignmentPair& a,
+                          const AlignmentPair& b,
+                          const AlignmentPair& newest,
+                          const AlignmentConfig& config) {
+  const Eigen::Vector2d from_newest_a = (a.p_odom_m - newest.p_odom_m).head<2>();
+  const Eigen::Vector2d from_newest_b = (b.p_odom_m - newest.p_odom_m).head<2>();
+  return config.lio_tilt_sigma_rad * config.lio_tilt_sigma_rad * from_newest_a.dot(from_newest_b);
+}
+
 /// Gauss-Markov GPS error, LIO's random walk counted back from the newest pair (so that the
-/// solution is T_map_odom as of now), and white error.
+/// solution is T_map_odom as of now), tilt of odom, and white error.
 Covariances residual_covariances(const std::vector<AlignmentPair>& pairs,
                                  const AlignmentConfig& config) {
   const auto n = static_cast<Eigen::Index>(pairs.size());
@@ -122,8 +133,9 @@ Covariances residual_covariances(const std::vector<AlignmentPair>& pairs,
           std::min(drift_variance(a, now_m, config), drift_variance(b, now_m, config));
       for (int axis = 0; axis < 3; ++axis) {
         const double value = share * std::sqrt(a.variance_map_m2[axis] * b.variance_map_m2[axis]);
-        covariances[static_cast<std::size_t>(axis)](i, j) = value + drift_m2;
-        covariances[static_cast<std::size_t>(axis)](j, i) = value + drift_m2;
+        const double tilt_m2 = axis == 2 ? tilt_covariance_m2(a, b, pairs.back(), config) : 0.0;
+        covariances[static_cast<std::size_t>(axis)](i, j) = value + drift_m2 + tilt_m2;
+        covariances[static_cast<std::size_t>(axis)](j, i) = value + drift_m2 + tilt_m2;
       }
     }
   }

@@ -15,6 +15,7 @@ constexpr double kUsableVariance_m2 = 1e4;  // above it the source does not know
 
 AlignmentConfig without_drift(AlignmentConfig config) {
   config.lio_drift_m_per_sqrt_m = 0.0;  // the source is held by the same fixes
+  config.lio_tilt_sigma_rad = 0.0;
   return config;
 }
 

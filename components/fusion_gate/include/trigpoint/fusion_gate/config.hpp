@@ -27,6 +27,7 @@ struct AlignmentConfig {
   double correlated_share{0.7};         ///< of the reported variance: Gauss-Markov
   double white_share{0.5};              ///< of the reported variance: new at every fix
   double lio_drift_m_per_sqrt_m{0.02};  ///< random walk of LIO with the distance driven
+  double lio_tilt_sigma_rad{0.01};      ///< of odom, which no GPS height can tell from z at once
   double residual_tolerance{4.0};       ///< chi-square may exceed its 99.9 % quantile by this
 };
 
