@@ -56,7 +56,7 @@ struct Eskf18Config {
 
 /// The only defaults of gps_odometry; every field is described (unit, rule) in src/config.cpp.
 struct Config {
-  std::string filter{"ekf15"};
+  std::string filter{"eskf18"};
 
   // What is published, and when.
   double publish_rate_hz{50.0};
