@@ -178,12 +178,12 @@ std::optional<Datum> datum_named_in(const std::string& trajectory_file);
 
 /// What was run, for the report.
 struct RunInfo {
-  std::string log;         ///< path or scenario
-  std::string how;         ///< "dds" or "offline"
-  std::string mode;        ///< of the gate
-  std::string gps_filter;  ///< e.g. "ekf15"
-  double data_s{0.0};      ///< duration of the log
-  double wall_s{0.0};      ///< processing time
+  std::string log;          ///< path or scenario
+  std::string how;          ///< "dds" or "offline"
+  std::string mode;         ///< of the gate
+  std::string gps_filter;   ///< e.g. "ekf15"
+  double data_s{0.0};       ///< duration of the log
+  double wall_s{0.0};       ///< processing time
   bool interrupted{false};  ///< by the user: what was in flight then is missing
 };
 
