@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
-#include "gate.hpp"
-
 #include "trigpoint/base/rejections.hpp"
+
+#include "gate.hpp"
 
 #include <algorithm>
 #include <map>
@@ -71,9 +71,8 @@ void FusionGate::Impl::take_gps_status(const GpsStatus& gps,
   if (writer != sources.followed()) {
     return;
   }
-  const bool told_of_a_fix =
-      gps.last_accepted_fix_ns != 0 &&
-      (!before || gps.last_accepted_fix_ns != before->last_accepted_fix_ns);
+  const bool told_of_a_fix = gps.last_accepted_fix_ns != 0 &&
+                             (!before || gps.last_accepted_fix_ns != before->last_accepted_fix_ns);
   settle_others(gps, before, told_of_a_fix);
   if (told_of_a_fix) {
     judge({gps.last_accepted_fix_ns, gps.accepted_antenna_map_m, gps.accepted_covariance_map_m2},
@@ -117,7 +116,8 @@ void FusionGate::Impl::settle_others(const GpsStatus& gps,
   settle(std::min(accepted, open),
          "behind_newer_fix",
          "accepted by " + gps.source + " behind a newer fix: its row would come too late");
-  settle(open, "refused_by_filter_no_reason_given", "refused by " + gps.source + " without a reason");
+  settle(
+      open, "refused_by_filter_no_reason_given", "refused by " + gps.source + " without a reason");
 }
 
 void FusionGate::Impl::take_raw_fix(const GnssFix& fix, Output& out) {

@@ -33,7 +33,8 @@ inline RejectionKind kind_of_rejection(std::string_view name) {
 
 /// The counts of one kind by name; equal names are added up.
 inline std::map<std::string, std::uint64_t> rejections_of_kind(
-    const std::vector<NamedCount>& rejections, RejectionKind kind) {
+    const std::vector<NamedCount>& rejections,
+    RejectionKind kind) {
   std::map<std::string, std::uint64_t> result;
   for (const NamedCount& entry : rejections) {
     if (kind_of_rejection(entry.name) == kind) {
