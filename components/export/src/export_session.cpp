@@ -14,25 +14,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void check(const std::string& session_folder,
-           const std::string& out_folder,
-           const ExportOptions& options) {
-  for (const auto& format : options.formats) {
-    if (format != "pcd" && format != "tum") {
-      throw std::runtime_error("unknown format '" + format + "', there are: pcd, tum");
-    }
-  }
-  create_session_folder(out_folder);
-  if (fs::equivalent(session_folder, out_folder)) {
-    throw std::runtime_error(out_folder + ": is the session itself, choose another folder");
-  }
-}
-
 /// truth.tum alone is no result: it comes with a log.
 void check_for_results(const std::string& session) {
-  if (!fs::is_directory(session)) {
-    throw std::runtime_error(session + ": is not a session folder");
-  }
   for (const char* name : {session_file::kKeyframes,
                            session_file::kMap,
                            session_file::kFused,
@@ -50,6 +33,24 @@ void check_for_results(const std::string& session) {
       (fs::exists(path_in(session, session_file::kTruth))
            ? "; a simulated drive becomes a session by `trigpoint map`"
            : ""));
+}
+
+void check(const std::string& session_folder,
+           const std::string& out_folder,
+           const ExportOptions& options) {
+  if (!fs::is_directory(session_folder)) {
+    throw std::runtime_error(session_folder + ": is not a session folder");
+  }
+  for (const auto& format : options.formats) {
+    if (format != "pcd" && format != "tum") {
+      throw std::runtime_error("unknown format '" + format + "', there are: pcd, tum");
+    }
+  }
+  if (fs::exists(out_folder) && fs::equivalent(session_folder, out_folder)) {
+    throw std::runtime_error(out_folder + ": is the session itself, choose another folder");
+  }
+  check_for_results(session_folder);
+  create_session_folder(out_folder);
 }
 
 void export_pcd(const std::string& session,
@@ -103,7 +104,6 @@ ExportReport export_session(const std::string& session_folder,
                             const std::string& out_folder,
                             const ExportOptions& options,
                             const std::function<void(double)>& progress) {
-  check_for_results(session_folder);
   check(session_folder, out_folder, options);
   ExportReport report;
   for (const auto& format : options.formats) {
