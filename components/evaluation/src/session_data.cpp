@@ -122,7 +122,9 @@ void load_counts(SessionData& data) {
 void load_config(SessionData& data, const ReportOptions& options) {
   load(data, file::kConfig, Need::kExpected, [&](const auto& path) {
     const YAML::Node config = YAML::LoadFile(path);
-    data.datum_fixes = config["gps_odometry"]["datum_fixes"].as<std::int64_t>(data.datum_fixes);
+    if (const YAML::Node gps = config["gps_odometry"]; gps && gps.IsMap()) {
+      data.datum_fixes = gps["datum_fixes"].as<std::int64_t>(data.datum_fixes);
+    }
     const YAML::Node lever = config["robot"]["antenna_position_base_m"];
     if (options.antenna_position_base_m) {
       return;

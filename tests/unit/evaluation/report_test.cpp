@@ -374,7 +374,7 @@ TEST(Report, tells_that_too_few_good_fixes_came_for_a_datum) {
   statuses.append(status);
   EXPECT_THAT(write_report(folder.path(), kNoPictures).problems,
               testing::ElementsAre(HasSubstr("fewer than 10 good fixes (the GPS filter accepted 4 "
-                                             "of 81)")));
+                                             "of 82)")));
 }
 
 TEST(Report, takes_the_maps_frame_from_the_map) {
