@@ -50,6 +50,7 @@ void render_map(const std::string& session) {
 }  // namespace
 
 int finish_session(const std::string& session) {
+  evaluation::check_is_session(session);  // before anything is written into the folder
   render_map(session);
   const evaluation::ReportResult report = evaluation::write_report(session);
   std::cout << report.text << "\n" << report.report_file << "\n";
@@ -59,7 +60,10 @@ int finish_session(const std::string& session) {
   for (const std::string& problem : report.problems) {
     std::cerr << "trigpoint report: " << problem << "\n";
   }
-  return report.complete ? 0 : 1;
+  for (const std::string& failure : report.failures) {
+    std::cerr << "trigpoint report: " << failure << "\n";
+  }
+  return report.complete && report.failures.empty() ? 0 : 1;
 }
 
 std::string mode_of(const SystemConfig& config) {

@@ -10,6 +10,7 @@
 #include <iostream>
 #include <memory>
 #include <string>
+#include <utility>
 
 namespace trigpoint::cli {
 
@@ -117,6 +118,13 @@ void print_outages(const std::string& fixes_file, const std::vector<PosePair>& p
 int run(const EvaluateOptions& options) {
   const Trajectory estimate = exporter::read_trajectory(options.estimate);
   const Trajectory reference = exporter::read_trajectory(options.reference);
+  for (const auto& [file, poses] : {std::pair(&options.estimate, estimate.size()),
+                                    std::pair(&options.reference, reference.size())}) {
+    if (poses == 0) {
+      std::cerr << "trigpoint evaluate: " << *file << " holds no poses\n";
+      return 1;
+    }
+  }
   const Association association = associate(estimate, reference);
   if (association.pairs.empty()) {
     std::cerr << "trigpoint evaluate: no pose of " << options.estimate

@@ -59,17 +59,18 @@ std::vector<Curve> curves_of(const SessionData& data) {
       curves.push_back(std::move(curve));
     }
   };
-  add({"truth", "truth", data.truth, "lines lw 5 lc rgb '#f2c230'"});
+  add({"truth", "truth", data.truth, "lines lw 8 lc rgb '#f2c230'"});
   add({"gps", "gps filter", data.gps, "lines lw 1.5 lc rgb '#1f6fbf'"});
+  add({"fused", "fused", data.fused, "lines lw 4.5 lc rgb '#17853c'"});
+  // Over the wider fused: where the two agree both are seen.
   if (const auto T_map_odom = lio_placement(data)) {
     add({"lio",
          "lio (yaw + translation)",
          placed(*T_map_odom, data.lio),
-         "lines lw 2 lc rgb '#e8772e'"});
+         "lines lw 1.5 lc rgb '#e8772e'"});
   } else {
-    add({"lio", "lio (odom, not aligned)", data.lio, "lines lw 2 lc rgb '#e8772e'"});
+    add({"lio", "lio (odom, not aligned)", data.lio, "lines lw 1.5 lc rgb '#e8772e'"});
   }
-  add({"fused", "fused", data.fused, "lines lw 2 lc rgb '#17853c'"});
   if (data.datum) {
     const auto all = fix_positions(data.fixes, *data.datum, FixChoice::kAll);
     const auto withheld = fix_positions(data.fixes, *data.datum, FixChoice::kWithheld);

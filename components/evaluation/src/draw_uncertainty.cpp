@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <sstream>
+#include <stdexcept>
 
 namespace trigpoint::evaluation {
 
@@ -17,6 +18,7 @@ namespace file = exporter::session_file;
 
 constexpr int kWidth_px = 1300;
 constexpr int kPanelHeight_px = 230;
+constexpr int kTimeLabel_px = 62;  ///< tics and label below the lowest panel
 constexpr double kLowestSigma_m = 1e-3;
 constexpr double kLowestError_m = 1e-3;
 constexpr double kUnknownSigma_m = 500.0;  ///< sqrt(kUnknownVariance) is 1000
@@ -55,12 +57,17 @@ class UncertaintyPicture {
         outages_(data.outages()) {}
 
   std::string draw(const std::string& gnuplot) {
+    if (data_.gate.empty() && data_.fused.empty() && data_.lio.empty() && data_.gps.empty()) {
+      throw std::runtime_error("uncertainty.png: there is nothing to draw");
+    }
     std::ostringstream body;
     const bool has_error = !data_.truth.empty();
     const int panels = has_error ? 5 : 4;
+    const int height_px = panels * kPanelHeight_px + 40;
     body << "set multiplot layout " << panels
          << ",1 title 'GPS uncertainty per axis, and what the gate chose' margins "
-            "0.075,0.84,0.05,0.965 spacing 0.035\n"
+            "0.075,0.84,"
+         << static_cast<double>(kTimeLabel_px) / height_px << ",0.965 spacing 0.035\n"
          << "set xrange [0:" << std::max(1.0, time(span_.end_ns)) << "]\n"
          << "set grid lc rgb '#dddddd'\nset tics out nomirror\nset key outside right top Left "
             "reverse samplen 2\n"
@@ -74,7 +81,7 @@ class UncertaintyPicture {
       body << "set format x '%g'\nset xlabel 'time [s]'\n" << error_panel();
     }
     body << "unset multiplot\n";
-    return picture_.draw(gnuplot, kWidth_px, panels * kPanelHeight_px + 40, body.str());
+    return picture_.draw(gnuplot, kWidth_px, height_px, body.str());
   }
 
  private:
@@ -201,7 +208,9 @@ class UncertaintyPicture {
         text += (text.empty() ? "" : ", \\\n     ") + curve;
       }
     }
-    return "set yrange [*:*]\nplot " + (text.empty() ? "1/0 notitle" : text) + "\n";
+    // gnuplot calls a panel without points an error: an empty one gets a line outside its range.
+    return text.empty() ? "unset logscale y\nset yrange [0:1]\nplot -1 notitle\n"
+                        : "set yrange [*:*]\nplot " + text + "\n";
   }
 
   std::string height_panel() const {
@@ -217,25 +226,25 @@ class UncertaintyPicture {
                        "points pt 2 ps 0.5 lc rgb '#7fb2e5'"),
                  curve("truth.z", "truth", heights(data_.truth), "lines lw 4 lc rgb '#f2c230'"),
                  curve("gps.z", "gps filter", heights(data_.gps), "lines lw 1 lc rgb '#1f6fbf'"),
+                 curve("fused.z", "fused", heights(data_.fused), "lines lw 4 lc rgb '#17853c'"),
+                 // Last and thinner: where the two agree both are seen.
                  curve("lio.z",
                        T_map_odom ? "lio (yaw + t)" : "lio (odom)",
                        heights(data_.lio, T_map_odom.value_or(Pose{})),
-                       "lines lw 1.5 lc rgb '#e8772e'"),
-                 curve("fused.z", "fused", heights(data_.fused), "lines lw 2 lc rgb '#17853c'")});
+                       "lines lw 1.5 lc rgb '#e8772e'")});
   }
 
   std::string error_panel() const {
     const auto T_map_odom = lio_placement(data_);
     // Centimetres with GPS and tens of metres without: only a logarithm shows both.
     return "set logscale y\nset ylabel 'error [m]'\n" +
-           plot(
-               {curve("gps.error", "gps filter", errors(data_.gps), "lines lw 1 lc rgb '#1f6fbf'"),
-                T_map_odom ? curve("lio.error",
-                                   "lio (yaw + t)",
-                                   errors(data_.lio, *T_map_odom),
-                                   "lines lw 1.5 lc rgb '#e8772e'")
-                           : std::string(),
-                curve("fused.error", "fused", errors(data_.fused), "lines lw 2 lc rgb '#17853c'")});
+           plot({curve("gps.error", "gps filter", errors(data_.gps), "lines lw 1 lc rgb '#1f6fbf'"),
+                 curve("fused.error", "fused", errors(data_.fused), "lines lw 4 lc rgb '#17853c'"),
+                 T_map_odom ? curve("lio.error",
+                                    "lio (yaw + t)",
+                                    errors(data_.lio, *T_map_odom),
+                                    "lines lw 1.5 lc rgb '#e8772e'")
+                            : std::string()});
   }
 
   const SessionData& data_;

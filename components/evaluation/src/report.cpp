@@ -29,12 +29,12 @@ void draw_all(const SessionData& data, const ReportOptions& options, ReportResul
   }
 }
 
-std::string print_problems(const std::vector<std::string>& problems) {
+std::string print_list(const std::string& heading, const std::vector<std::string>& sentences) {
   std::string text;
-  for (const auto& problem : problems) {
-    text += "- " + problem + "\n";
+  for (const auto& sentence : sentences) {
+    text += "- " + sentence + "\n";
   }
-  return text.empty() ? text : "## Problems\n\n" + text + "\n";
+  return text.empty() ? text : "## " + heading + "\n\n" + text + "\n";
 }
 
 std::string print_pictures(const std::vector<std::string>& pictures) {
@@ -49,19 +49,41 @@ std::string print_pictures(const std::vector<std::string>& pictures) {
                             "trajectories.gp` draws anew.\n";
 }
 
+/// Fixes that no alignment came of are a failure; without fixes nobody expects one.
+std::vector<std::string> find_failures(const SessionData& data, const Accounting& found) {
+  std::vector<std::string> failures;
+  if (!found.losses.empty() && !data.interrupted()) {
+    failures.push_back("Not all messages are accounted for: " + found.losses.front() +
+                       (found.losses.size() > 1 ? ", and more (see Messages)." : "."));
+  }
+  const bool lio_only = data.run && data.run->mode == "lio";
+  const bool admitted = data.alignment && data.alignment->admitted;
+  if (!lio_only && !admitted && data.fixes_fed() > 0) {
+    failures.push_back("No alignment of odom with map was admitted although there were " +
+                       std::to_string(data.fixes_fed()) +
+                       " fixes: the map is not georeferenced reliably.");
+  }
+  if (data.fused.empty() && !(lio_only && data.fixes_fed() == 0)) {
+    failures.push_back(std::string(file::kFused) + " is empty: nothing was published in map.");
+  }
+  return failures;
+}
+
 }  // namespace
 
 ReportResult write_report(const std::string& session_folder, const ReportOptions& options) {
   const auto data = load_session(session_folder, options);
   ReportResult result;
   result.problems = data.problems;
+  const Accounting found = account(data);
+  result.failures = find_failures(data, found);
   if (options.pictures) {
     draw_all(data, options, result);
   }
-  result.text = print_problems(result.problems) + print_run(data) + "\n## Errors\n\n" +
-                print_scores(data, score_session(data)) + "\n" + print_alignment(data) + "\n" +
-                print_gate(data) + "\n" + print_times(data) + "\n" + print_accounting(data) + "\n" +
-                print_map(data);
+  result.text = print_list("Failed", result.failures) + print_list("Problems", result.problems) +
+                print_run(data) + "\n## Errors\n\n" + print_scores(data, score_session(data)) +
+                "\n" + print_alignment(data) + "\n" + print_gate(data) + "\n" + print_times(data) +
+                "\n" + print_accounting(data, found) + "\n" + print_map(data);
   result.report_file = data.path(file::kReport);
   exporter::write_text(
       result.report_file,

@@ -74,6 +74,16 @@ std::string axis_table(const SessionData& data) {
   return table.str();
 }
 
+bool nobody_chosen(const std::vector<FusionStatus>& rows) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto seconds = seconds_by_source(rows, axis);
+    if (seconds[1] + seconds[2] + seconds[3] > 0.0) {
+      return false;
+    }
+  }
+  return true;
+}
+
 /// The number after "POINTS" in a PCD's header.
 std::string points_of(const std::string& pcd) {
   std::ifstream in(pcd, std::ios::binary);
@@ -85,6 +95,23 @@ std::string points_of(const std::string& pcd) {
     }
   }
   return "an unknown number of";
+}
+
+/// What the file says of its frame goes before what the session's other files lead to expect.
+std::string place_of_map(const SessionData& data, const std::string& pcd) {
+  const auto named = exporter::frame_of_pcd(pcd);
+  const std::string frame = !named.empty() ? named : data.alignment ? "map" : "odom";
+  if (frame == "odom") {
+    return "Its frame is odom: nothing aligned it with map.";
+  }
+  if (!data.alignment) {
+    return "Its frame is map, by the alignment that the mapper had; no " +
+           std::string(file::kAlignment) + " was left.";
+  }
+  return data.alignment->admitted
+             ? "Its frame is map, placed with the alignment above."
+             : "Placed with the alignment above, which the gate has **not admitted**: neither its "
+               "place nor its direction can be relied on.";
 }
 
 std::string thickness_text(const std::string& pcd) {
@@ -112,6 +139,9 @@ std::string thickness_text(const std::string& pcd) {
 
 std::string print_run(const SessionData& data) {
   std::string text = "## What was run\n\n";
+  if (data.interrupted()) {
+    text += "**The run was interrupted by the user**; this is about what was done so far.\n\n";
+  }
   if (data.run) {
     const auto& run = *data.run;
     text += "- Log: `" + run.log + "`, " + fixed(run.data_s, 1) +
@@ -172,7 +202,12 @@ std::string print_gate(const SessionData& data) {
   if (!verdicts.is_empty()) {
     text += verdicts.str() + "\n";
   }
-  return text + "Share of time by source, per axis:\n\n" + axis_table(data);
+  text += "Share of time by source, per axis:\n\n" + axis_table(data);
+  if (!data.fused.empty() && nobody_chosen(data.gate)) {
+    text += "\n" + std::string(file::kFused) + " holds " + std::to_string(data.fused.size()) +
+            " poses although no status names a source for longer than a moment.\n";
+  }
+  return text;
 }
 
 std::string print_times(const SessionData& data) {
@@ -209,10 +244,8 @@ std::string print_map(const SessionData& data) {
     return text + "There is no " + std::string(file::kMap) + ".\n";
   }
   return text + "[" + file::kMap + "](" + file::kMap + "): " + points_of(map) + " points, " +
-         fixed(static_cast<double>(bytes) * 1e-6, 1) + " MB. " +
-         (data.alignment ? "Placed with the alignment above"
-                         : "Without an alignment, so its frame is odom") +
-         ".\n\n" + thickness_text(map);
+         fixed(static_cast<double>(bytes) * 1e-6, 1) + " MB. " + place_of_map(data, map) + "\n\n" +
+         thickness_text(map);
 }
 
 }  // namespace trigpoint::evaluation

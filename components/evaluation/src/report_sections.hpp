@@ -6,6 +6,7 @@
 #include "session_data.hpp"
 
 #include <string>
+#include <vector>
 
 namespace trigpoint::evaluation {
 
@@ -15,7 +16,16 @@ std::string print_gate(const SessionData& data);
 std::string print_times(const SessionData& data);
 std::string print_map(const SessionData& data);
 
+/// Sentences about messages that went missing, and about those that were refused with a reason.
+struct Accounting {
+  bool counted{false};  ///< somebody counted what was published
+  std::vector<std::string> losses;
+  std::vector<std::string> refusals;
+};
+
+Accounting account(const SessionData& data);
+
 /// What became of every message, ending in a sentence that says that all was used, or what was not.
-std::string print_accounting(const SessionData& data);
+std::string print_accounting(const SessionData& data, const Accounting& found);
 
 }  // namespace trigpoint::evaluation

@@ -2,9 +2,12 @@
 // Copyright the Trigpoint developers
 #include "session_data.hpp"
 
+#include "trigpoint/geodesy/local_frame.hpp"
+
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <limits>
 #include <stdexcept>
@@ -17,6 +20,8 @@ namespace fs = std::filesystem;
 namespace file = exporter::session_file;
 
 constexpr double kUsualIntervals = 2.5;
+/// Data are printed to 1e-9 degree and 1e-4 m.
+constexpr double kSameDatum_m = 0.001;
 
 enum class Need { kExpected, kOptional };
 
@@ -63,13 +68,34 @@ void load_logs(SessionData& data) {
   });
 }
 
+/// A run that is too short, or a receiver that sends nothing good, is the usual cause.
+std::string why_no_datum(const SessionData& data) {
+  const auto fed = data.fixes_fed();
+  if (data.fixes.empty()) {
+    return "There is no datum: the log holds no fix, and the configuration names none.";
+  }
+  const auto accepted =
+      data.gps_status.empty() ? std::uint64_t{0} : data.gps_status.back().fixes_accepted;
+  if (static_cast<std::int64_t>(accepted) < data.datum_fixes) {
+    return "There is no datum: fewer than " + std::to_string(data.datum_fixes) +
+           " good fixes (the GPS filter accepted " + std::to_string(accepted) + " of " +
+           std::to_string(fed) + ").";
+  }
+  return "There is no datum although the GPS filter accepted " + std::to_string(accepted) +
+         " fixes: they never agreed with each other for long enough, or " + file::kDatum +
+         " was lost.";
+}
+
 void load_records(SessionData& data) {
   load(data, file::kRun, Need::kExpected, [&](const auto& path) {
     data.run = exporter::read_run(path);
   });
-  load(data, file::kDatum, Need::kExpected, [&](const auto& path) {
+  load(data, file::kDatum, Need::kOptional, [&](const auto& path) {
     data.datum = exporter::read_datum(path);
   });
+  if (!fs::exists(data.path(file::kDatum))) {
+    data.problems.push_back(why_no_datum(data));
+  }
   load(data, file::kAlignment, Need::kOptional, [&](const auto& path) {
     data.alignment = exporter::read_alignment(path);
   });
@@ -92,10 +118,17 @@ void load_counts(SessionData& data) {
   });
 }
 
-/// The one value of the effective configuration that scoring needs.
-void load_lever_arm(SessionData& data) {
+/// The values of the effective configuration that the report needs.
+void load_config(SessionData& data, const ReportOptions& options) {
   load(data, file::kConfig, Need::kExpected, [&](const auto& path) {
-    const YAML::Node lever = YAML::LoadFile(path)["robot"]["antenna_position_base_m"];
+    const YAML::Node config = YAML::LoadFile(path);
+    if (const YAML::Node gps = config["gps_odometry"]; gps && gps.IsMap()) {
+      data.datum_fixes = gps["datum_fixes"].as<std::int64_t>(data.datum_fixes);
+    }
+    const YAML::Node lever = config["robot"]["antenna_position_base_m"];
+    if (options.antenna_position_base_m) {
+      return;
+    }
     if (!lever.IsSequence() || lever.size() != 3) {
       throw std::runtime_error(path +
                                " does not say robot.antenna_position_base_m: scoring against "
@@ -104,6 +137,47 @@ void load_lever_arm(SessionData& data) {
     for (std::size_t i = 0; i < 3; ++i) {
       data.antenna_position_base_m[static_cast<Eigen::Index>(i)] = lever[i].as<double>();
     }
+  });
+  data.antenna_position_base_m =
+      options.antenna_position_base_m.value_or(data.antenna_position_base_m);
+}
+
+/// Truth in the tangent plane of another datum is another frame: no score may be made of it.
+void check_truth(SessionData& data) {
+  if (data.truth.empty() || !data.datum) {
+    return;
+  }
+  const auto named = exporter::datum_named_in(data.path(file::kTruth));
+  if (!named) {
+    return;
+  }
+  const double moved_m = (geodesy::LocalFrame(*data.datum)
+                              .to_map({named->latitude_deg, named->longitude_deg, named->height_m})
+                              .value_or(Eigen::Vector3d::Constant(kNaN)))
+                             .norm();
+  if (moved_m <= kSameDatum_m) {
+    return;
+  }
+  data.truth_refused =
+      std::string(file::kTruth) + " is in map at datum " + named->id() +
+      ", the session's datum is " + data.datum->id() +
+      (std::isfinite(moved_m) ? ", " + std::to_string(std::llround(std::ceil(moved_m))) + " m away"
+                              : ", elsewhere on the Earth") +
+      ": not scored against it";
+  data.truth.clear();
+}
+
+bool holds_a_session(const std::string& folder) {
+  const auto names = {file::kRun,
+                      file::kConfig,
+                      file::kFused,
+                      file::kLio,
+                      file::kGps,
+                      file::kKeyframes,
+                      file::kFixes,
+                      file::kGate};
+  return std::any_of(names.begin(), names.end(), [&](const char* name) {
+    return fs::exists(exporter::path_in(folder, name));
   });
 }
 
@@ -169,21 +243,33 @@ Window SessionData::span() const {
   return span.begin_ns <= span.end_ns ? span : Window{};
 }
 
-SessionData load_session(const std::string& folder, const ReportOptions& options) {
+std::size_t SessionData::fixes_fed() const {
+  return static_cast<std::size_t>(std::count_if(fixes.begin(), fixes.end(), [](const auto& logged) {
+    return !logged.withheld && logged.fix.status != FixStatus::kNoFix;
+  }));
+}
+
+void check_is_session(const std::string& folder) {
   if (!fs::is_directory(folder)) {
     throw std::runtime_error(folder + ": is not a session folder");
   }
+  if (!holds_a_session(folder)) {
+    throw std::runtime_error(folder + ": is not a session: it holds neither " + file::kRun + ", " +
+                             file::kConfig + ", a trajectory, " + file::kKeyframes + ", " +
+                             file::kFixes + " nor " + file::kGate);
+  }
+}
+
+SessionData load_session(const std::string& folder, const ReportOptions& options) {
+  check_is_session(folder);
   SessionData data;
   data.folder = folder;
   load_trajectories(data);
   load_logs(data);
+  load_config(data, options);
   load_records(data);
+  check_truth(data);
   load_counts(data);
-  if (options.antenna_position_base_m) {
-    data.antenna_position_base_m = *options.antenna_position_base_m;
-  } else {
-    load_lever_arm(data);
-  }
   return data;
 }
 

@@ -31,11 +31,14 @@ struct SessionData {
   Trajectory lio;
   Trajectory gps;
   Trajectory truth;
+  /// Not empty: truth.tum is there and must not be scored against, and why.
+  std::string truth_refused;
   std::vector<exporter::LoggedFix> fixes;
   std::vector<FusionStatus> gate;
   std::vector<GpsStatus> gps_status;
   std::vector<exporter::LoggedScan> scans;
   std::vector<ProgramCounts> counts;
+  std::int64_t datum_fixes{10};  ///< that an election takes, of the session's configuration
   Eigen::Vector3d antenna_position_base_m{Eigen::Vector3d::Zero()};
 
   /// Stamps of the fixes that took part: accepted by the GPS filter, else used by the gate, else
@@ -47,6 +50,11 @@ struct SessionData {
 
   /// First and last stamp of anything; zero without anything.
   Window span() const;
+
+  bool interrupted() const { return run && run->interrupted; }
+
+  /// Fixes that the filters were given.
+  std::size_t fixes_fed() const;
 
   std::string path(const std::string& name) const { return exporter::path_in(folder, name); }
 };

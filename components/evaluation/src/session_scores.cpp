@@ -205,8 +205,15 @@ std::string print_scores(const SessionData& data, const std::vector<ScoreBlock>&
   for (const auto& block : blocks) {
     text += print(block);
   }
+  if (!data.truth_refused.empty()) {
+    text = "**" + data.truth_refused +
+           ".** A run with the same datum (gps_odometry.datum_*) can be " +
+           "scored against it; the picture does not show it either.\n\n" + text;
+  }
   if (blocks.empty()) {
-    text = "There is nothing to measure against: no truth.tum, and no fixes with a datum.\n\n";
+    text +=
+        "There is nothing to measure against: no truth.tum that could be used, and no fixes with a "
+        "datum.\n\n";
   }
   return text + print_step(data);
 }

@@ -14,6 +14,27 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// truth.tum alone is no result: it comes with a log.
+void check_for_results(const std::string& session) {
+  for (const char* name : {session_file::kKeyframes,
+                           session_file::kMap,
+                           session_file::kFused,
+                           session_file::kFusedSmoothed,
+                           session_file::kLio,
+                           session_file::kGps}) {
+    if (fs::exists(path_in(session, name))) {
+      return;
+    }
+  }
+  throw std::runtime_error(
+      session +
+      ": nothing to export: it holds neither keyframes.sqlite, map.pcd, fused.tum, "
+      "lio.tum nor gps.tum" +
+      (fs::exists(path_in(session, session_file::kTruth))
+           ? "; a simulated drive becomes a session by `trigpoint map`"
+           : ""));
+}
+
 void check(const std::string& session_folder,
            const std::string& out_folder,
            const ExportOptions& options) {
@@ -25,10 +46,11 @@ void check(const std::string& session_folder,
       throw std::runtime_error("unknown format '" + format + "', there are: pcd, tum");
     }
   }
-  create_session_folder(out_folder);
-  if (fs::equivalent(session_folder, out_folder)) {
+  if (fs::exists(out_folder) && fs::equivalent(session_folder, out_folder)) {
     throw std::runtime_error(out_folder + ": is the session itself, choose another folder");
   }
+  check_for_results(session_folder);
+  create_session_folder(out_folder);
 }
 
 void export_pcd(const std::string& session,
@@ -50,7 +72,10 @@ void export_pcd(const std::string& session,
                                   std::to_string(report.map.points_written) + " points"});
   } else if (fs::exists(path_in(session, session_file::kMap))) {
     copy_file(path_in(session, session_file::kMap), target);
-    report.written.push_back({target, "copied: the session holds no keyframes"});
+    const std::string frame = frame_of_pcd(target);
+    report.written.push_back({target,
+                              (frame.empty() ? "" : "frame " + frame + ", ") +
+                                  "copied: the session holds no keyframes"});
   } else {
     report.missing.push_back("no map: the session holds neither keyframes.sqlite nor map.pcd");
   }

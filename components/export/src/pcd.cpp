@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <stdexcept>
 
 namespace trigpoint::exporter {
@@ -38,6 +39,17 @@ void write_pcd(const std::string& file, const PointCloud& cloud) {
   PcdWriter writer(file);
   writer.append(cloud);
   writer.finish();
+}
+
+std::string frame_of_pcd(const std::string& file) {
+  const std::string key = "# frame ";
+  std::ifstream in(file, std::ios::binary);
+  for (std::string line; std::getline(in, line) && line.starts_with('#');) {
+    if (line.starts_with(key)) {
+      return line.substr(key.size());
+    }
+  }
+  return "";
 }
 
 PointCloud read_pcd(const std::string& file) {

@@ -23,8 +23,11 @@ constexpr int kCountWidth = 12;
 
 }  // namespace
 
-PcdWriter::PcdWriter(const std::string& file)
-    : file_(file), part_(file + ".part"), out_(part_, std::ios::binary | std::ios::trunc) {
+PcdWriter::PcdWriter(const std::string& file, const std::string& frame)
+    : file_(file),
+      part_(file + ".part"),
+      frame_(frame),
+      out_(part_, std::ios::binary | std::ios::trunc) {
   check("open for writing");
   out_ << header();
   check("write");
@@ -39,7 +42,9 @@ PcdWriter::~PcdWriter() {
 
 std::string PcdWriter::header() const {
   std::ostringstream text;
-  text << "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z intensity\n"
+  text << "# .PCD v0.7 - Point Cloud Data file format\n"
+       << (frame_.empty() ? "" : "# frame " + frame_ + "\n")
+       << "VERSION 0.7\nFIELDS x y z intensity\n"
        << "SIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\n"
        << std::setfill('0') << "WIDTH " << std::setw(kCountWidth) << points_
        << "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\n"

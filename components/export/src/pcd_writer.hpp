@@ -14,7 +14,8 @@ namespace trigpoint::exporter {
 /// cloud in memory. The file gets its name in finish(): one that is there is whole.
 class PcdWriter {
  public:
-  explicit PcdWriter(const std::string& file);
+  /// `frame` is told in a comment of the header; empty: nothing is told.
+  explicit PcdWriter(const std::string& file, const std::string& frame = "");
   ~PcdWriter();
   PcdWriter(const PcdWriter&) = delete;
   PcdWriter& operator=(const PcdWriter&) = delete;
@@ -29,6 +30,7 @@ class PcdWriter {
 
   std::string file_;
   std::string part_;
+  std::string frame_;
   std::ofstream out_;
   std::uint64_t points_{0};
   bool finished_{false};

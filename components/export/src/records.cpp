@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
 // The small YAML files of a session: written by hand (few keys, fixed order), read strictly.
+#include "trigpoint/base/rejections.hpp"
 #include "trigpoint/export/session.hpp"
 
 #include "csv.hpp"
@@ -8,11 +9,14 @@
 #include <unistd.h>
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <numbers>
+#include <sstream>
 #include <stdexcept>
 
 namespace trigpoint::exporter {
@@ -192,12 +196,39 @@ AlignmentRecord read_alignment(const std::string& file) {
   return result;
 }
 
+bool differs_substantially(const AlignmentRecord& next, const AlignmentRecord& written) {
+  // Half of what a map's points are averaged over, at the end of a lever of 50 m.
+  constexpr double kLeast_m = 0.05;
+  constexpr double kLeast_rad = 0.001;
+  const YawPose& a = next.alignment.T_map_odom;
+  const YawPose& b = written.alignment.T_map_odom;
+  return next.admitted != written.admitted ||
+         next.alignment.odom_epoch != written.alignment.odom_epoch ||
+         !((a.p - b.p).norm() < kLeast_m) ||
+         !(std::abs(std::remainder(a.yaw_rad - b.yaw_rad, 2.0 * std::numbers::pi)) < kLeast_rad) ||
+         !((a.tilt_rad - b.tilt_rad).norm() < kLeast_rad);
+}
+
+std::optional<Datum> datum_named_in(const std::string& trajectory_file) {
+  const std::string key = "# datum ";
+  std::ifstream in(trajectory_file);
+  for (std::string line; std::getline(in, line) && line.starts_with('#');) {
+    Datum datum;
+    std::istringstream words(line.substr(std::min(key.size(), line.size())));
+    if (line.starts_with(key) &&
+        words >> datum.latitude_deg >> datum.longitude_deg >> datum.height_m) {
+      return datum;
+    }
+  }
+  return std::nullopt;
+}
+
 void write_run(const std::string& file, const RunInfo& run) {
   write_text(file,
              "log: " + quoted(run.log) + "\nhow: " + quoted(run.how) +
                  "\nmode: " + quoted(run.mode) + "\ngps_filter: " + quoted(run.gps_filter) +
                  "\ndata_s: " + number_text(run.data_s) + "\nwall_s: " + number_text(run.wall_s) +
-                 "\n");
+                 "\n" + (run.interrupted ? "interrupted: true\n" : ""));
 }
 
 RunInfo read_run(const std::string& file) {
@@ -209,6 +240,7 @@ RunInfo read_run(const std::string& file) {
   run.gps_filter = record.get<std::string>("gps_filter");
   run.data_s = record.get<double>("data_s");
   run.wall_s = record.get<double>("wall_s");
+  run.interrupted = record.node()["interrupted"] && record.get<bool>("interrupted");
   return run;
 }
 
@@ -237,9 +269,14 @@ std::vector<NamedCount> counts_of(const GpsStatus& status) {
   std::vector<NamedCount> counts{{"imu.received", status.imu_received},
                                  {"fix.received", status.fixes_received},
                                  {"fix.used", status.fixes_accepted}};
-  for (const auto& [reason, count] : status.rejections) {
-    counts.push_back({"fix.refused." + reason, count});
-  }
+  const auto add = [&](const char* prefix, RejectionKind kind) {
+    for (const auto& [reason, count] : rejections_of_kind(status.rejections, kind)) {
+      counts.push_back({prefix + reason, count});
+    }
+  };
+  add("fix.refused.", RejectionKind::kFixRefused);
+  add("fix.note.", RejectionKind::kNote);
+  add("imu.refused.", RejectionKind::kImu);
   return counts;
 }
 

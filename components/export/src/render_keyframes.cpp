@@ -57,9 +57,9 @@ void settle_for_odom(Epochs& epochs, MapReport& report) {
 
 class Renderer {
  public:
-  Renderer(Epochs epochs, double voxel_m, const std::string& out_pcd)
+  Renderer(Epochs epochs, double voxel_m, const std::string& out_pcd, const std::string& frame)
       : epochs_(std::move(epochs)),
-        file_(out_pcd),
+        file_(out_pcd, frame),
         tiles_(voxel_m, kMostVoxels, [this](const PointCloud& points) { file_.append(points); }) {}
 
   void add(const Keyframe& keyframe, MapReport& report) {
@@ -129,7 +129,7 @@ MapReport render_keyframes(const KeyframeSource& keyframes,
   if (!placed && all > 0) {
     settle_for_odom(epochs, report);
   }
-  Renderer renderer(epochs, voxel_m, out_pcd);
+  Renderer renderer(epochs, voxel_m, out_pcd, report.frame);
   keyframes([&](const Keyframe& keyframe) {
     renderer.add(keyframe, report);
     if (progress) {

@@ -30,7 +30,9 @@ struct FusionGate::Impl {
   void take_gps_odometry(const Odometry& odometry, const std::string& writer, Output& out);
   void take_gps_status(const GpsStatus& status, const std::string& writer, Output& out);
   void take_raw_fix(const GnssFix& fix, Output& out);
-  void note_refusals_of_filter(const GpsStatus& status, const std::optional<GpsStatus>& before);
+  void settle_others(const GpsStatus& status,
+                     const std::optional<GpsStatus>& last,
+                     bool told_of_a_fix);
   void judge(const AcceptedFix& fix, const std::optional<Refusal>& refusal, Output& out);
   void accept(const AcceptedFix& fix, Output& out);
   void follow_healthiest(Output& out);

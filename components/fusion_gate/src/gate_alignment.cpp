@@ -130,6 +130,10 @@ void FusionGate::Impl::take_lio_status(const LioStatus& next, Output& out) {
 void FusionGate::Impl::begin_epoch(const LioStatus& next, Output& out) {
   lio_poses.forget_before(next.stamp_ns);
   window.clear();
+  for (const AcceptedFix& fix : pending) {
+    verdicts.record(fix.stamp_ns, false, "odom_epoch", "LIO began another odom epoch meanwhile");
+  }
+  verdict_changed = verdict_changed || !pending.empty();
   pending.clear();
   last_imu_rate_ns.reset();
   tell(out,

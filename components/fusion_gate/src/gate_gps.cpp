@@ -1,26 +1,36 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
+#include "trigpoint/base/rejections.hpp"
+
 #include "gate.hpp"
 
 #include <algorithm>
+#include <map>
 
 namespace trigpoint::fusion_gate {
 
 namespace {
 
 constexpr std::size_t kMaxPendingFixes = 64;
+constexpr const char* kBeforeDatum = "before_datum";
 
-/// What the filter says about the newest fix that it refused: the reason whose count grew.
-std::string newest_rejection(const GpsStatus& now, const GpsStatus& before) {
-  for (const NamedCount& entry : now.rejections) {
-    const auto old = std::find_if(before.rejections.begin(),
-                                  before.rejections.end(),
-                                  [&](const NamedCount& e) { return e.name == entry.name; });
-    if (old == before.rejections.end() ? entry.count > 0 : entry.count > old->count) {
-      return entry.name;
+/// Fixes that were newly refused, by reason.
+std::map<std::string, std::uint64_t> new_refusals(const GpsStatus& now, const GpsStatus& before) {
+  const auto old = rejections_of_kind(before.rejections, RejectionKind::kFixRefused);
+  std::map<std::string, std::uint64_t> result;
+  for (const auto& [reason, count] :
+       rejections_of_kind(now.rejections, RejectionKind::kFixRefused)) {
+    const auto found = old.find(reason);
+    const std::uint64_t known = found == old.end() ? 0 : found->second;
+    if (count > known) {
+      result[reason] = count - known;
     }
   }
-  return "no reason given";
+  return result;
+}
+
+std::uint64_t growth(std::uint64_t now, std::uint64_t before) {
+  return now > before ? now - before : 0;
 }
 
 }  // namespace
@@ -61,31 +71,53 @@ void FusionGate::Impl::take_gps_status(const GpsStatus& gps,
   if (writer != sources.followed()) {
     return;
   }
-  note_refusals_of_filter(gps, before);
-  if (gps.last_accepted_fix_ns != 0 &&
-      (!before || gps.last_accepted_fix_ns != before->last_accepted_fix_ns)) {
+  const bool told_of_a_fix = gps.last_accepted_fix_ns != 0 &&
+                             (!before || gps.last_accepted_fix_ns != before->last_accepted_fix_ns);
+  settle_others(gps, before, told_of_a_fix);
+  if (told_of_a_fix) {
     judge({gps.last_accepted_fix_ns, gps.accepted_antenna_map_m, gps.accepted_covariance_map_m2},
           check_status(gps, datum_id()),
           out);
   }
 }
 
-void FusionGate::Impl::note_refusals_of_filter(const GpsStatus& gps,
-                                               const std::optional<GpsStatus>& before) {
-  if (!before) {
-    return;
+/// A status speaks of the newest accepted fix only. The others that the filter has received since
+/// its last one get their verdict here, so that every fix has exactly one: refused ones by reason,
+/// and accepted ones that came behind a newer fix (late ones overtake each other).
+void FusionGate::Impl::settle_others(const GpsStatus& gps,
+                                     const std::optional<GpsStatus>& last,
+                                     bool told_of_a_fix) {
+  const bool began_anew = last && gps.fixes_received < last->fixes_received;
+  const GpsStatus before = last && !began_anew ? *last : GpsStatus{};
+  std::uint64_t open = growth(gps.fixes_received, before.fixes_received);
+  if (!last) {
+    // What the filter had received before this gate began is nobody's business here.
+    open = std::min(open, growth(fixes_seen, verdicts.total()));
   }
-  const auto refused = [](const GpsStatus& s) {
-    return s.fixes_received - std::min(s.fixes_accepted, s.fixes_received);
+  const auto settle = [&](std::uint64_t count, const std::string& code, const std::string& why) {
+    for (; count > 0 && open > 0; --count, --open) {
+      verdicts.record(gps.stamp_ns, false, code, why);
+      verdict_changed = true;
+    }
   };
-  for (std::uint64_t k = refused(*before); k < refused(gps); ++k) {
-    const std::string reason = newest_rejection(gps, *before);
-    verdicts.record(gps.stamp_ns,
-                    false,
-                    "refused_by_filter_" + reason,
-                    "refused by " + gps.source + ": " + reason);
-    verdict_changed = true;
+  for (const auto& [reason, count] : new_refusals(gps, before)) {
+    settle(count, "refused_by_filter_" + reason, "refused by " + gps.source + ": " + reason);
   }
+  if (told_of_a_fix && open > 0) {
+    --open;  // gets its own verdict
+  } else if (told_of_a_fix && verdicts.is_known(kBeforeDatum) &&
+             !verdicts.is_judged(gps.last_accepted_fix_ns)) {
+    verdicts.take_back(kBeforeDatum);  // told of again, now that it has a place in map
+  }
+  const std::uint64_t accepted = growth(gps.fixes_accepted, before.fixes_accepted);
+  if (gps.datum_id.empty()) {
+    settle(accepted, kBeforeDatum, "accepted by " + gps.source + " before there was a datum");
+  }
+  settle(std::min(accepted, open),
+         "behind_newer_fix",
+         "accepted by " + gps.source + " behind a newer fix: its row would come too late");
+  settle(
+      open, "refused_by_filter_no_reason_given", "refused by " + gps.source + " without a reason");
 }
 
 void FusionGate::Impl::take_raw_fix(const GnssFix& fix, Output& out) {

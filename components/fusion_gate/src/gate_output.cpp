@@ -133,6 +133,10 @@ FusionStatus FusionGate::Impl::status() const {
   result.fixes_seen = fixes_seen;
   result.fixes_used = verdicts.used();
   result.verdicts = verdicts.counts();
+  // So that the counts always add up to the fixes seen.
+  if (fixes_seen > verdicts.total()) {
+    result.verdicts.push_back({"waiting", fixes_seen - verdicts.total()});
+  }
   result.gps_source = sources.followed();
   return result;
 }

@@ -23,6 +23,9 @@ constexpr Nanoseconds kStatusInterval_ns = kNanosecondsPerSecond;
 // Fixes ahead of the IMU one after another mean that the IMU has stopped.
 constexpr int kSilentImuFixes = 3;
 constexpr double kFrozenSpeed_mps = 0.5;
+// A map's float32 points resolve 4 mm there; a datum farther off is a mistake (a sign, another
+// site's configuration) rather than a choice.
+constexpr double kFarthestDatum_m = 50'000.0;
 
 std::optional<Datum> configured_datum(const Config& config) {
   if (!config.use_configured_datum) {
@@ -59,6 +62,7 @@ struct GpsOdometry::Impl {
   void take_fix(const GnssFix& message, Output& output);
   std::optional<CheckedFix> checked(const GnssFix& message, Output& output);
   bool is_untimely(const CheckedFix& fix, Output& output);
+  bool is_far_from_datum(const CheckedFix& fix, Output& output);
   void refuse(const std::string& reason,
               const std::string& text,
               Nanoseconds stamp_ns,
@@ -83,6 +87,7 @@ struct GpsOdometry::Impl {
   std::uint64_t fixes_received{0};
   std::uint64_t imu_received{0};
   Nanoseconds now_ns{0};
+  bool datum_is_near{false};  ///< a fix has confirmed it
   int fixes_ahead{0};
   Nanoseconds newest_ahead_ns{0};
   std::optional<Nanoseconds> published_ns;
@@ -136,7 +141,8 @@ std::optional<CheckedFix> GpsOdometry::Impl::checked(const GnssFix& message, Out
   if (!verdict.reason.empty()) {
     refuse(verdict.reason, verdict.text, message.stamp_ns, output);
   }
-  if (!verdict.fix || is_untimely(*verdict.fix, output)) {
+  if (!verdict.fix || is_untimely(*verdict.fix, output) ||
+      is_far_from_datum(*verdict.fix, output)) {
     return std::nullopt;
   }
   const bool moving =
@@ -190,6 +196,26 @@ bool GpsOdometry::Impl::is_untimely(const CheckedFix& fix, Output& output) {
     return true;
   }
   return false;
+}
+
+/// Only until one fix was near: a drive may lead far away from where its map begins.
+bool GpsOdometry::Impl::is_far_from_datum(const CheckedFix& fix, Output& output) {
+  if (!datum || datum_is_near) {
+    return false;
+  }
+  const auto p = frame->to_map(fix.place);
+  const double distance_m = p ? p->norm() : kNaN;
+  datum_is_near = distance_m <= kFarthestDatum_m;
+  if (!datum_is_near) {
+    refuse("far_from_datum",
+           "Fix refused: it is " + std::to_string(distance_m * 1e-3) + " km from the datum " +
+               datum->id() +
+               ", expected at most 50; is a sign or the order of latitude and "
+               "longitude wrong, or the datum another place's?",
+           fix.stamp_ns,
+           output);
+  }
+  return !datum_is_near;
 }
 
 MapFix GpsOdometry::Impl::place(const CheckedFix& fix) const {

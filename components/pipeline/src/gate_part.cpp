@@ -7,6 +7,12 @@ namespace trigpoint::pipeline {
 namespace file = exporter::session_file;
 using exporter::path_in;
 
+namespace {
+
+constexpr double kRewriteAfter_s = 3.0;
+
+}  // namespace
+
 GatePart::GatePart(const std::string& session)
     : session_(session),
       trajectory_(path_in(session, file::kFused), "base_link in map, as published online"),
@@ -23,11 +29,25 @@ void GatePart::on_status(const FusionStatus& status) {
 }
 
 void GatePart::on_alignment(const Alignment& alignment, bool admitted) {
-  exporter::write_alignment(path_in(session_, file::kAlignment),
-                            {alignment, admitted, admitted ? "" : "not admitted by the gate"});
+  newest_alignment_ = {alignment, admitted, admitted ? "" : "not admitted by the gate"};
+  const bool new_verdict = !written_alignment_ || written_alignment_->admitted != admitted;
+  const bool due = to_seconds(last_.stamp_ns - written_ns_) >= kRewriteAfter_s;
+  if (new_verdict ||
+      (due && exporter::differs_substantially(*newest_alignment_, *written_alignment_))) {
+    write_alignment(*newest_alignment_);
+  }
+}
+
+void GatePart::write_alignment(const exporter::AlignmentRecord& record) {
+  exporter::write_alignment(path_in(session_, file::kAlignment), record);
+  written_alignment_ = record;
+  written_ns_ = last_.stamp_ns;
 }
 
 void GatePart::close() {
+  if (newest_alignment_) {
+    write_alignment(*newest_alignment_);
+  }
   counts_.write(exporter::counts_of(last_));
 }
 

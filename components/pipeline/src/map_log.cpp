@@ -27,10 +27,8 @@ class Session {
 
   void on_entry(const recording::LogEntry& entry) { log_.on_entry(entry); }
 
-  void on_step(Step& step, double step_ms) {
-    if (step.datum) {
-      gps_.on_datum(*step.datum);
-    }
+  void on_step(Step& step, const Lockstep& cores, double step_ms) {
+    keep_datum(cores);
     for (const Odometry& odometry : step.gps_odometry) {
       gps_.on_odometry(odometry);
     }
@@ -47,27 +45,44 @@ class Session {
     for (const FusionStatus& status : step.fusion_status) {
       gate_.on_status(status);
     }
+    if (!step.fusion_status.empty()) {
+      keep_alignment(cores);
+    }
   }
 
   void close(const Lockstep& cores) {
-    if (const auto datum = cores.datum()) {
-      gps_.on_datum(*datum);
-    }
-    if (const auto alignment = cores.best_alignment()) {
-      gate_.on_alignment(*alignment, cores.lio_status().aligned);
-    }
+    keep_datum(cores);
+    keep_alignment(cores);
     gps_.close(cores.gps_status());
     mapper_.close(cores.lio_status());
     gate_.close();
     log_.close();
   }
 
+  void keep_truth(const recording::LogReader& log) const { log_.keep_truth(log); }
+
   const LogPart& log() const { return log_; }
 
   std::string path(const char* name) const { return exporter::path_in(folder_, name); }
 
  private:
+  /// As soon as there is one: a run that is killed keeps its georeference.
+  void keep_datum(const Lockstep& cores) {
+    const auto datum = cores.datum();
+    if (datum && datum->id() != written_datum_) {
+      gps_.on_datum(*datum);
+      written_datum_ = datum->id();
+    }
+  }
+
+  void keep_alignment(const Lockstep& cores) {
+    if (const auto alignment = cores.best_alignment()) {
+      gate_.on_alignment(*alignment, cores.lio_status().aligned);
+    }
+  }
+
   std::string folder_;
+  std::string written_datum_;
   GpsPart gps_;
   MapperPart mapper_;
   GatePart gate_;
@@ -101,13 +116,25 @@ MapLogResult map_log(recording::LogReader& log,
   exporter::create_session_folder(options.session);
   Session session(options.session);
   exporter::write_text(session.path(file::kConfig), options.config_text);
+  session.keep_truth(log);
   const Clock::time_point start = Clock::now();
   MapLogResult result;
+  const auto write_run = [&] {
+    exporter::write_run(session.path(file::kRun),
+                        {log.summary().path,
+                         "offline",
+                         options.mode,
+                         configs.gps_odometry.filter,
+                         result.data_s,
+                         result.wall_s,
+                         result.stopped});
+  };
+  write_run();  // a run that is killed says at least what it was
 
   const auto run = [&](auto&& advance) {
     const Clock::time_point before = Clock::now();
     Step step = advance();
-    session.on_step(step, milliseconds_since(before));
+    session.on_step(step, cores, milliseconds_since(before));
     tell(step, options);
   };
   while (const auto entry = next_entry(log, result.log_error)) {
@@ -128,14 +155,7 @@ MapLogResult map_log(recording::LogReader& log,
   result.sweeps_used = cores.lio_status().scans_used;
   result.data_s = to_seconds(session.log().last_ns() - session.log().first_ns());
   result.wall_s = milliseconds_since(start) * 1e-3;
-  exporter::write_run(session.path(file::kRun),
-                      {log.summary().path,
-                       "offline",
-                       options.mode,
-                       configs.gps_odometry.filter,
-                       result.data_s,
-                       result.wall_s});
-  session.log().keep_truth(log);
+  write_run();
   return result;
 }
 

@@ -163,6 +163,11 @@ void write_records(const std::string& folder) {
       .write({{"points.received", 1201}, {"points.used", 1201}, {"imu.received", 24000}});
   exporter::CountsWriter(folder, "gps_odometry")
       .write({{"fix.received", 81}, {"fix.used", 81}, {"imu.received", 24000}});
+  exporter::CountsWriter(folder, "fusion_gate")
+      .write({{"fix.judged", 81},
+              {"fix.used", 72},
+              {"fix.verdict.used", 72},
+              {"fix.verdict.stale", 9}});
 }
 
 /// Ground along the road, and facades 8 m to its left, 6 m high.

@@ -227,13 +227,165 @@ TEST(Report, goes_on_with_the_rest_when_a_file_is_damaged_or_missing) {
   EXPECT_THAT(result.text, AllOf(HasSubstr("gate.csv:1"), HasSubstr("| fused.tum")));
 }
 
-TEST(Report, of_a_session_without_anything_is_written_and_incomplete) {
+TEST(Report, of_a_session_without_results_is_written_and_incomplete) {
   const ScratchFolder folder;
+  write_all(folder.file("config.yaml"), "robot:\n  antenna_position_base_m: [0, 0, 0]\n");
   const auto result = write_report(folder.path());
   EXPECT_FALSE(result.complete);
   EXPECT_TRUE(std::filesystem::exists(result.report_file));
   EXPECT_THAT(result.text, HasSubstr("nothing to measure against"));
+  EXPECT_THAT(result.problems, Each(Not(HasSubstr("gnuplot"))));
+  EXPECT_FALSE(std::filesystem::exists(folder.file("uncertainty.png")));
+}
+
+TEST(Report, refuses_a_folder_that_is_no_session_and_writes_nothing_into_it) {
+  const ScratchFolder folder;
+  write_all(folder.file("letter.txt"), "dear");
+  EXPECT_THAT(error_of([&] { write_report(folder.path()); }), HasSubstr("is not a session"));
+  EXPECT_FALSE(std::filesystem::exists(folder.file("report.md")));
+  EXPECT_FALSE(std::filesystem::exists(folder.file("plots")));
   EXPECT_THAT(error_of([] { write_report("/nowhere"); }), HasSubstr("/nowhere"));
+}
+
+TEST(Report, takes_a_program_that_left_no_counts_for_a_loss) {
+  for (const char* program : {"lio_mapper", "fusion_gate", "gps_odometry"}) {
+    const ScratchFolder folder;
+    make_session(folder.path());
+    std::filesystem::remove(folder.file(std::string(program) + ".counts.yaml"));
+    const auto result = write_report(folder.path(), kNoPictures);
+    const std::string sentence =
+        "no counts of " + std::string(program) + ": it ended without closing its part";
+    EXPECT_THAT(result.text, AllOf(HasSubstr("\nNOT ALL ACCOUNTED FOR"), HasSubstr(sentence)));
+    EXPECT_THAT(result.failures, testing::ElementsAre(HasSubstr(sentence)));
+  }
+}
+
+TEST(Report, knows_from_its_log_alone_that_a_program_ran) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  for (const char* name : {"lio_mapper.counts.yaml", "lio.tum", "scans.csv"}) {
+    std::filesystem::remove(folder.file(name));
+  }
+  EXPECT_THAT(write_report(folder.path(), kNoPictures).text, HasSubstr("\nALL USED"));
+  std::filesystem::create_directories(folder.file("logs"));
+  write_all(folder.file("logs/trigpoint_lio_mapper.log"), "ready\n");
+  EXPECT_THAT(write_report(folder.path(), kNoPictures).text, HasSubstr("no counts of lio_mapper"));
+}
+
+TEST(Report, takes_the_death_of_the_player_for_a_loss) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  std::filesystem::remove(folder.file("player.counts.yaml"));
+  EXPECT_THAT(write_report(folder.path(), kNoPictures).text,
+              AllOf(HasSubstr("\nNOT ALL ACCOUNTED FOR"), HasSubstr("no counts of the log")));
+}
+
+TEST(Report, keeps_notes_on_used_fixes_and_refused_imu_samples_out_of_the_fixes_balance) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  exporter::CountsWriter(folder.path(), "gps_odometry")
+      .write({{"fix.received", 81},
+              {"fix.used", 80},
+              {"fix.refused.gate", 1},
+              {"fix.note.used_with_default_covariance", 80},
+              {"fix.note.recovered", 1},
+              {"imu.received", 24000},
+              {"imu.refused.imu_not_finite", 96}});
+  const auto result = write_report(folder.path(), kNoPictures);
+  EXPECT_THAT(result.failures, IsEmpty());
+  EXPECT_THAT(result.text,
+              AllOf(HasSubstr("\nALL ACCOUNTED FOR"),
+                    HasSubstr("gps_odometry used 80 of 81 fix messages (refused: gate 1)"),
+                    HasSubstr("gps_odometry refused 96 of 24000 imu messages (imu_not_finite 96)"),
+                    HasSubstr("recovered 1, used_with_default_covariance 80"),
+                    Not(HasSubstr("without a counted reason"))));
+}
+
+TEST(Report, takes_a_fix_without_a_verdict_of_the_gate_for_a_loss) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  exporter::CountsWriter(folder.path(), "fusion_gate")
+      .write({{"fix.judged", 81}, {"fix.used", 78}, {"fix.verdict.used", 78}});
+  EXPECT_THAT(write_report(folder.path(), kNoPictures).text,
+              AllOf(HasSubstr("\nNOT ALL ACCOUNTED FOR"),
+                    HasSubstr("fusion_gate gave 78 verdicts on 81 fix messages")));
+}
+
+TEST(Report, says_that_the_user_interrupted_the_run_and_takes_that_for_no_failure) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  auto run = exporter::read_run(folder.file("run.yaml"));
+  run.interrupted = true;
+  exporter::write_run(folder.file("run.yaml"), run);
+  exporter::CountsWriter(folder.path(), "lio_mapper")
+      .write({{"points.received", 1200}, {"points.used", 1200}, {"imu.received", 24000}});
+  const auto result = write_report(folder.path(), kNoPictures);
+  EXPECT_THAT(result.failures, IsEmpty());
+  EXPECT_THAT(result.text,
+              AllOf(HasSubstr("**The run was interrupted by the user**"),
+                    HasSubstr("NOT ALL ACCOUNTED FOR, because the run was interrupted")));
+}
+
+TEST(Report, fails_without_an_admitted_alignment_but_in_mode_lio) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  auto record = exporter::read_alignment(folder.file("alignment.yaml"));
+  record.admitted = false;
+  exporter::write_alignment(folder.file("alignment.yaml"), record);
+  const auto refused = write_report(folder.path(), kNoPictures);
+  EXPECT_THAT(refused.failures, testing::ElementsAre(HasSubstr("No alignment")));
+  EXPECT_THAT(refused.text, AllOf(HasSubstr("## Failed"), HasSubstr("**not admitted**")));
+  auto run = exporter::read_run(folder.file("run.yaml"));
+  run.mode = "lio";
+  exporter::write_run(folder.file("run.yaml"), run);
+  EXPECT_THAT(write_report(folder.path(), kNoPictures).failures, IsEmpty());
+}
+
+TEST(Report, fails_when_nothing_was_published_in_map) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  write_all(folder.file("fused.tum"), "# nothing\n");
+  EXPECT_THAT(write_report(folder.path(), kNoPictures).failures,
+              testing::ElementsAre(HasSubstr("fused.tum is empty")));
+}
+
+TEST(Report, does_not_score_against_truth_at_another_datum_and_says_why) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  const auto truth = read_all(folder.file("truth.tum"));
+  write_all(folder.file("truth.tum"), "# datum 48.980000000 8.390000000 116.0000  # lat\n" + truth);
+  EXPECT_THAT(write_report(folder.path(), kNoPictures).text, HasSubstr("### Against truth.tum"));
+  write_all(folder.file("truth.tum"), "# datum 48.981000000 8.390000000 116.0000  # lat\n" + truth);
+  // A thousandth of a degree of latitude is 111.2 m there.
+  EXPECT_THAT(write_report(folder.path(), kNoPictures).text,
+              AllOf(Not(HasSubstr("### Against truth.tum")),
+                    HasSubstr("truth.tum is in map at datum 48.981000000"),
+                    HasSubstr("112 m away: not scored")));
+}
+
+TEST(Report, tells_that_too_few_good_fixes_came_for_a_datum) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  std::filesystem::remove(folder.file("datum.yaml"));
+  exporter::GpsStatusLog statuses(folder.file("gps_status.csv"));
+  GpsStatus status;
+  status.stamp_ns = 1'700'000'000'000'000'000;
+  status.fixes_accepted = 4;
+  statuses.append(status);
+  EXPECT_THAT(write_report(folder.path(), kNoPictures).problems,
+              testing::ElementsAre(HasSubstr("fewer than 10 good fixes (the GPS filter accepted 4 "
+                                             "of 82)")));
+}
+
+TEST(Report, takes_the_maps_frame_from_the_map) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  std::filesystem::remove(folder.file("alignment.yaml"));
+  const auto pcd = read_all(folder.file("map.pcd"));
+  const auto version = pcd.find("VERSION");
+  EXPECT_THAT(write_report(folder.path(), kNoPictures).text, HasSubstr("Its frame is odom"));
+  write_all(folder.file("map.pcd"), pcd.substr(0, version) + "# frame map\n" + pcd.substr(version));
+  EXPECT_THAT(write_report(folder.path(), kNoPictures).text, HasSubstr("Its frame is map, by the"));
 }
 
 TEST(Report, is_written_without_pictures_when_gnuplot_is_missing) {

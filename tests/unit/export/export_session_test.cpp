@@ -102,5 +102,27 @@ TEST_F(ExportSession, names_the_keyframe_file_that_cannot_be_read) {
   EXPECT_THAT(error_of([&] { export_session(session(), out()); }), HasSubstr("keyframes.sqlite"));
 }
 
+TEST_F(ExportSession, takes_truth_alone_for_no_result) {
+  TrajectoryWriter(path_in(session(), session_file::kTruth), "base_link in map").append(1, Pose{});
+  EXPECT_THAT(error_of([&] { export_session(session(), out()); }),
+              AllOf(HasSubstr("nothing to export"), HasSubstr("trigpoint map")));
+  EXPECT_FALSE(std::filesystem::exists(out("truth.tum")));
+}
+
+TEST_F(ExportSession, and_the_map_file_itself_agree_on_the_frame) {
+  write_keyframe();
+  EXPECT_THAT(export_session(session(), out(), {{"pcd"}, 0.1}).written[0].content,
+              HasSubstr("frame odom"));
+  EXPECT_EQ(frame_of_pcd(out("map.pcd")), "odom");
+  write_alignment(path_in(session(), session_file::kAlignment), {});
+  export_session(session(), out(), {{"pcd"}, 0.1});
+  EXPECT_EQ(frame_of_pcd(out("map.pcd")), "map");
+  ASSERT_EQ(read_pcd(out("map.pcd")).size(), 1U);  // the comment is no hindrance to readers
+  std::filesystem::copy(out("map.pcd"), path_in(session(), session_file::kMap));
+  std::filesystem::remove(path_in(session(), session_file::kKeyframes));
+  EXPECT_THAT(export_session(session(), out(), {{"pcd"}, 0.1}).written[0].content,
+              HasSubstr("frame map, copied"));
+}
+
 }  // namespace
 }  // namespace trigpoint::exporter

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 
 namespace trigpoint::exporter {
 namespace {
@@ -231,6 +232,71 @@ TEST(SessionFolder, is_created_with_its_parents_and_refused_where_a_file_is) {
   write_all(folder.file("c"), "");
   EXPECT_THAT(error_of([&] { create_session_folder(folder.file("c")); }),
               HasSubstr(folder.file("c")));
+}
+
+TEST(Session, counts_tell_refused_fixes_from_notes_and_from_the_imu) {
+  GpsStatus status;
+  status.fixes_received = 10;
+  status.fixes_accepted = 7;
+  status.rejections = {{"before_imu", 1},
+                       {"before_imu", 1},
+                       {"gate", 1},
+                       {"imu_units_g", 4782},
+                       {"recovered", 1},
+                       {"used_with_default_covariance", 6}};
+  const ScratchFolder folder;
+  const CountsWriter writer(folder.path(), "gps_odometry");
+  writer.write(counts_of(status));
+  std::map<std::string, std::uint64_t> counts;
+  for (const NamedCount& entry : read_counts(folder.file("gps_odometry.counts.yaml"))) {
+    counts[entry.name] = entry.count;
+  }
+  EXPECT_EQ(counts["fix.refused.before_imu"], 2U);
+  EXPECT_EQ(counts["fix.refused.gate"], 1U);
+  EXPECT_EQ(counts["fix.note.recovered"], 1U);
+  EXPECT_EQ(counts["fix.note.used_with_default_covariance"], 6U);
+  EXPECT_EQ(counts["imu.refused.imu_units_g"], 4782U);
+  EXPECT_FALSE(counts.contains("fix.refused.imu_units_g"));
+}
+
+TEST(Session, remembers_that_a_run_was_interrupted) {
+  const ScratchFolder folder;
+  RunInfo run{"log", "dds", "hard", "ekf15", 1.0, 2.0};
+  write_run(folder.file("run.yaml"), run);
+  EXPECT_FALSE(read_run(folder.file("run.yaml")).interrupted);
+  // As a shell script notes it afterwards.
+  write_all(folder.file("run.yaml"), read_all(folder.file("run.yaml")) + "interrupted: true\n");
+  EXPECT_TRUE(read_run(folder.file("run.yaml")).interrupted);
+  run.interrupted = true;
+  write_run(folder.file("run.yaml"), run);
+  EXPECT_TRUE(read_run(folder.file("run.yaml")).interrupted);
+}
+
+TEST(Session, reads_the_datum_that_a_truth_file_names) {
+  const ScratchFolder folder;
+  write_all(folder.file("t.tum"),
+            "# truth\n# datum 43.945600000 -78.896800000 100.0000  # latitude\n");
+  const auto datum = datum_named_in(folder.file("t.tum"));
+  ASSERT_TRUE(datum);
+  EXPECT_EQ(datum->id(), (Datum{43.9456, -78.8968, 100.0, 0}.id()));
+  write_all(folder.file("u.tum"), "# truth\n1 0 0 0 0 0 0 1\n# datum 1 2 3\n");
+  EXPECT_FALSE(datum_named_in(folder.file("u.tum")));
+  EXPECT_FALSE(datum_named_in("/nowhere"));
+}
+
+TEST(Session, an_alignment_differs_when_a_map_would_lie_visibly_elsewhere) {
+  AlignmentRecord written;
+  written.alignment.T_map_odom = {3.1415, {10.0, 20.0, 1.0}};
+  AlignmentRecord next = written;
+  EXPECT_FALSE(differs_substantially(next, written));
+  next.alignment.T_map_odom.p.x() += 0.01;
+  next.alignment.T_map_odom.yaw_rad = -3.1415;  // 0.2 mrad further, across the cut
+  EXPECT_FALSE(differs_substantially(next, written));
+  next.alignment.T_map_odom.p.x() += 0.1;
+  EXPECT_TRUE(differs_substantially(next, written));
+  next = written;
+  next.admitted = true;
+  EXPECT_TRUE(differs_substantially(next, written));
 }
 
 }  // namespace

@@ -224,5 +224,22 @@ TEST(GpsOdometry, refuses_a_datum_that_is_not_a_place) {
   EXPECT_EQ(driven.filter.datum()->id(), test_datum().id());
 }
 
+// ---- datum far away
+// ------------------------------------------------------------------------------
+
+TEST(GpsOdometry, refuses_every_fix_when_the_configured_datum_has_the_wrong_sign_and_says_so) {
+  const Sensors sensors = rtk_robot();
+  const auto truth = drive(town(1.5, 3.0), 20.0);
+  Config config = config_with_datum();
+  config.datum_longitude_deg = -config.datum_longitude_deg;
+  GpsOdometry filter(config, sensors.robot);
+  const Recorded result = run(filter, sense(truth, sensors, 1), truth);
+  const GpsStatus& last = result.statuses.back();
+  ASSERT_GT(last.fixes_received, 50U);
+  EXPECT_EQ(last.fixes_accepted, 0U);
+  EXPECT_GT(count_of(last, "far_from_datum"), 50U);
+  EXPECT_TRUE(result.odometry.empty());
+}
+
 }  // namespace
 }  // namespace trigpoint::gps_odometry

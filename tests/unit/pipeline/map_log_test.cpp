@@ -3,6 +3,7 @@
 #include "trigpoint/pipeline/map_log.hpp"
 
 #include "trigpoint/export/session.hpp"
+#include "trigpoint/pipeline/session_parts.hpp"
 
 #include "../export/scratch_folder.hpp"
 #include "stored_log.hpp"
@@ -136,6 +137,88 @@ TEST(MapLog, tells_its_progress_and_the_cores_events) {
 TEST(MapLog, names_the_session_that_it_cannot_write) {
   StoredLog log(stored_drive().entries);
   EXPECT_THAT(test::error_of([&] { run("/proc/none", log); }), testing::HasSubstr("/proc/none"));
+}
+
+/// Looks at the session while the run still goes on, as after kill -9.
+class WatchedRun {
+ public:
+  explicit WatchedRun(const ScratchFolder& folder) {
+    StoredLog log(stored_drive().entries);
+    MapLogOptions options;
+    options.session = folder.path();
+    options.mode = "hard";
+    options.on_event = [&](const Event& event) {
+      admitted_ = admitted_ || event.code == "alignment_admitted";
+    };
+    options.stop = [&] {
+      had_run = had_run || std::filesystem::exists(folder.file("run.yaml"));
+      had_datum = had_datum || std::filesystem::exists(folder.file("datum.yaml"));
+      if (admitted_ && !had_admitted && std::filesystem::exists(folder.file("alignment.yaml"))) {
+        had_admitted = exporter::read_alignment(folder.file("alignment.yaml")).admitted;
+      }
+      return false;
+    };
+    map_log(log, stored_drive().configs, options);
+  }
+
+  bool had_run{false};
+  bool had_datum{false};
+  bool had_admitted{false};
+
+ private:
+  bool admitted_{false};
+};
+
+TEST(MapLog, has_written_the_georeference_before_its_end) {
+  const ScratchFolder folder;
+  const WatchedRun watched(folder);
+  EXPECT_TRUE(watched.had_run);
+  EXPECT_TRUE(watched.had_datum);
+  EXPECT_TRUE(watched.had_admitted);
+}
+
+TEST(MapLog, gives_every_fix_one_verdict) {
+  const ScratchFolder folder;
+  run(folder.path(), stored_drive().entries);
+  std::uint64_t verdicts = 0;
+  for (const NamedCount& count : exporter::read_counts(folder.file("fusion_gate.counts.yaml"))) {
+    verdicts += count.name.starts_with("fix.verdict.") ? count.count : 0;
+  }
+  EXPECT_EQ(verdicts, count<GnssFix>(stored_drive().entries));
+  EXPECT_EQ(verdicts, count_of(folder, "fusion_gate", "fix.judged"));
+}
+
+TEST(MapLog, notes_that_it_was_interrupted) {
+  const ScratchFolder folder;
+  StoredLog log(stored_drive().entries);
+  MapLogOptions options;
+  options.session = folder.path();
+  std::size_t asked = 0;
+  options.stop = [&] { return ++asked == 100; };
+  map_log(log, stored_drive().configs, options);
+  EXPECT_TRUE(exporter::read_run(folder.file("run.yaml")).interrupted);
+  run(folder.path(), stored_drive().entries);
+  EXPECT_FALSE(exporter::read_run(folder.file("run.yaml")).interrupted);
+}
+
+TEST(GatePart, rewrites_the_alignment_when_it_moves_and_not_at_every_status) {
+  const ScratchFolder folder;
+  GatePart part(folder.path());
+  const auto at = [&](double now_s, double x_m, bool admitted) {
+    FusionStatus status;
+    status.stamp_ns = from_seconds(now_s);
+    part.on_status(status);
+    Alignment alignment;
+    alignment.T_map_odom.p.x() = x_m;
+    part.on_alignment(alignment, admitted);
+    return exporter::read_alignment(folder.file("alignment.yaml")).alignment.T_map_odom.p.x();
+  };
+  EXPECT_EQ(at(100.0, 1.0, false), 1.0);
+  EXPECT_EQ(at(101.0, 2.0, false), 1.0);   // too soon
+  EXPECT_EQ(at(101.2, 2.0, true), 2.0);    // admitted: at once
+  EXPECT_EQ(at(110.0, 2.001, true), 2.0);  // nothing new
+  EXPECT_EQ(at(111.0, 2.5, true), 2.5);
+  part.close();
 }
 
 }  // namespace

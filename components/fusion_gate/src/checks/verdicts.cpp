@@ -13,7 +13,7 @@ constexpr std::size_t kRemembered = 256;  // 25 s at 10 Hz, far more than a filt
 }  // namespace
 
 bool Verdicts::is_new(Nanoseconds fix_stamp_ns) {
-  if (std::find(judged_ns_.begin(), judged_ns_.end(), fix_stamp_ns) != judged_ns_.end()) {
+  if (is_judged(fix_stamp_ns)) {
     return false;
   }
   judged_ns_.push_back(fix_stamp_ns);
@@ -23,12 +23,28 @@ bool Verdicts::is_new(Nanoseconds fix_stamp_ns) {
   return true;
 }
 
+bool Verdicts::is_judged(Nanoseconds fix_stamp_ns) const {
+  return std::find(judged_ns_.begin(), judged_ns_.end(), fix_stamp_ns) != judged_ns_.end();
+}
+
+void Verdicts::take_back(const std::string& code) {
+  const auto found = counts_.find(code);
+  if (found == counts_.end()) {
+    return;
+  }
+  --total_;
+  if (--found->second == 0) {
+    counts_.erase(found);
+  }
+}
+
 void Verdicts::record(Nanoseconds fix_stamp_ns,
                       bool used,
                       const std::string& code,
                       const std::string& reason) {
   newest_ = {fix_stamp_ns, used, reason};
   used_ += used ? 1 : 0;
+  ++total_;
   ++counts_[code];
 }
 

@@ -19,14 +19,23 @@ class Verdicts {
   /// reports it.
   bool is_new(Nanoseconds fix_stamp_ns);
 
+  bool is_judged(Nanoseconds fix_stamp_ns) const;
+
   void record(Nanoseconds fix_stamp_ns,
               bool used,
               const std::string& code,
               const std::string& reason);
 
+  bool is_known(const std::string& code) const { return counts_.contains(code); }
+
+  /// One verdict fewer of this code: its fix is going to get another one.
+  void take_back(const std::string& code);
+
   const FixVerdict& newest() const { return newest_; }
 
   std::uint64_t used() const { return used_; }
+
+  std::uint64_t total() const { return total_; }
 
   std::vector<NamedCount> counts() const;  ///< by code, sorted by name
 
@@ -34,6 +43,7 @@ class Verdicts {
   std::deque<Nanoseconds> judged_ns_;  // the newest ones; bounded
   FixVerdict newest_;
   std::uint64_t used_{0};
+  std::uint64_t total_{0};
   std::map<std::string, std::uint64_t> counts_;
 };
 

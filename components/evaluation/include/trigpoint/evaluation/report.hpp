@@ -25,15 +25,21 @@ struct ReportResult {
   std::vector<std::string> pictures;  ///< PNG files written
   /// What the session lacks or what failed, one sentence each; they stand in report.md too.
   std::vector<std::string> problems;
+  /// Why the run was no success although it could be reported on: messages not accounted for
+  /// without an interruption by the user, no alignment, nothing in map. One sentence each.
+  std::vector<std::string> failures;
   /// There was a trajectory to report on, every file in the session could be read, and every
   /// picture that was asked for is there. The exit code should follow this.
   bool complete{false};
 };
 
+/// Throws std::runtime_error when `folder` does not exist or holds no file of a session.
+void check_is_session(const std::string& folder);
+
 /// Reads the session, writes report.md, and the pictures trajectories.png, uncertainty.png and
 /// scan_times.png with their gnuplot scripts and data in plots/. What is missing or damaged is told
 /// in `problems` and the rest is still reported. Throws std::runtime_error only when the folder
-/// does not exist or report.md cannot be written.
+/// does not exist, holds no file of a session, or report.md cannot be written.
 ReportResult write_report(const std::string& session_folder, const ReportOptions& options = {});
 
 }  // namespace trigpoint::evaluation

@@ -42,6 +42,10 @@ MapReport render_map(const std::string& keyframes_file,
 /// Binary PCD with x y z intensity.
 void write_pcd(const std::string& file, const PointCloud& cloud);
 
+/// The frame that the map's file names, "map" or "odom"; empty when it names none or there is no
+/// such file.
+std::string frame_of_pcd(const std::string& file);
+
 /// Reads x y z and, when there, intensity.
 PointCloud read_pcd(const std::string& file);
 

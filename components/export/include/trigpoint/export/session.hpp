@@ -13,6 +13,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -164,17 +165,26 @@ struct AlignmentRecord {
   std::string comment;  ///< e.g. why it is not admitted
 };
 
+/// Whether `next` tells a reader something that `written` does not: another epoch or verdict, or a
+/// map that lies visibly elsewhere.
+bool differs_substantially(const AlignmentRecord& next, const AlignmentRecord& written);
+
 void write_alignment(const std::string& file, const AlignmentRecord& record);
 AlignmentRecord read_alignment(const std::string& file);
 
+/// The datum that a trajectory file names in its head ("# datum LAT LON HEIGHT", deg, deg, m), as
+/// truth files do; nullopt when it names none.
+std::optional<Datum> datum_named_in(const std::string& trajectory_file);
+
 /// What was run, for the report.
 struct RunInfo {
-  std::string log;         ///< path or scenario
-  std::string how;         ///< "dds" or "offline"
-  std::string mode;        ///< of the gate
-  std::string gps_filter;  ///< e.g. "ekf15"
-  double data_s{0.0};      ///< duration of the log
-  double wall_s{0.0};      ///< processing time
+  std::string log;          ///< path or scenario
+  std::string how;          ///< "dds" or "offline"
+  std::string mode;         ///< of the gate
+  std::string gps_filter;   ///< e.g. "ekf15"
+  double data_s{0.0};       ///< duration of the log
+  double wall_s{0.0};       ///< processing time
+  bool interrupted{false};  ///< by the user: what was in flight then is missing
 };
 
 void write_run(const std::string& file, const RunInfo& run);
@@ -182,7 +192,8 @@ RunInfo read_run(const std::string& file);
 
 /// <program>.counts.yaml: `name: number` lines, replaced whole at each write. Names are
 /// `<stream>.<what>[.<reason>]`, stream one of points, imu, fix; what one of in_log, published,
-/// withheld, received, used, refused, and of the gate judged, verdict (kinds of use among them).
+/// withheld, received, used, refused, note (used all the same), and of the gate judged, verdict
+/// (kinds of use among them).
 /// The report compares them along the way of each stream.
 class CountsWriter {
  public:

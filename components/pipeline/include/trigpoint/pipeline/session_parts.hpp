@@ -54,16 +54,23 @@ class GatePart {
   explicit GatePart(const std::string& session);
   void on_fused(const Odometry& odometry);
   void on_status(const FusionStatus& status);
-  /// The best alignment so far; cheap enough for once a second of data time.
+  /// The best alignment so far. Written when it tells something new, and then at most every few
+  /// seconds of data time (the newest status's) unless the gate's verdict on it changed; cheap
+  /// enough for every status.
   void on_alignment(const Alignment& alignment, bool admitted);
   void close();
 
  private:
+  void write_alignment(const exporter::AlignmentRecord& record);
+
   std::string session_;
   exporter::TrajectoryWriter trajectory_;
   exporter::GateLog gate_log_;
   exporter::CountsWriter counts_;
   FusionStatus last_;
+  std::optional<exporter::AlignmentRecord> newest_alignment_;
+  std::optional<exporter::AlignmentRecord> written_alignment_;
+  Nanoseconds written_ns_{0};
 };
 
 /// fixes.csv and the counts of what the log held and of what was handed on.
