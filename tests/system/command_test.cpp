@@ -7,7 +7,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <csignal>
 #include <filesystem>
+#include <iterator>
+#include <thread>
 
 namespace trigpoint {
 namespace {
@@ -100,7 +103,9 @@ TEST(Command, every_verb_has_help) {
 }
 
 TEST(Command, an_unknown_verb_or_option_is_a_usage_error) {
-  EXPECT_EQ(trigpoint({"mapp"}).exit_code, 2);
+  const CommandResult unknown = trigpoint({"mapp"});
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_THAT(unknown.output, AllOf(HasSubstr("no verb 'mapp'"), HasSubstr("simulate")));
   EXPECT_EQ(trigpoint({"map", "short", "--outt", "x"}).exit_code, 2);
   EXPECT_EQ(trigpoint({}).exit_code, 2);
 }
@@ -108,8 +113,9 @@ TEST(Command, an_unknown_verb_or_option_is_a_usage_error) {
 TEST(Command, a_missing_log_is_named) {
   const TemporaryFolder folder;
   const CommandResult result = trigpoint({"map", "/no/such/drive.bag", "--out", folder.path("s")});
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.output, HasSubstr("/no/such/drive.bag"));
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.output, AllOf(HasSubstr("/no/such/drive.bag"), HasSubstr("campus, ")));
+  EXPECT_FALSE(fs::exists(folder.path("s")));
 }
 
 TEST(Command, a_mistyped_configuration_key_is_refused_with_file_line_and_suggestion) {
@@ -135,7 +141,7 @@ TEST(Command, an_unknown_topic_is_refused_with_what_is_there) {
   tests::write_file(folder.path("c.yaml"), "robot: {imu_topic: imu/dta}\n");
   const CommandResult result = trigpoint(
       {"map", folder.path("bag"), "--config", folder.path("c.yaml"), "--out", folder.path("s")});
-  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.output, AllOf(HasSubstr("imu/dta"), HasSubstr("imu/data")));
 }
 
@@ -209,6 +215,139 @@ TEST(Command, a_full_disk_is_named_and_ends_with_a_failure) {
   EXPECT_THAT(result.output, HasSubstr("lio.tum"));
 }
 
+TEST(Command, a_wrong_number_is_a_usage_error_and_leaves_nothing) {
+  const TemporaryFolder folder;
+  const std::vector<std::vector<std::string>> wrong{{"map", "short", "--duration", "inf"},
+                                                    {"map", "short", "--duration", "1e400"},
+                                                    {"map", "short", "--duration", "nan"},
+                                                    {"map", "short", "--duration", "-5"},
+                                                    {"map", "short", "--duration", "0"},
+                                                    {"map", "short", "--seed", "-1"},
+                                                    {"map", "short", "--seed", "1e23"},
+                                                    {"map", "short", "--mode", "nonsense"},
+                                                    {"simulate", "short", "--duration", "1e9"},
+                                                    {"simulate", "shrt"},
+                                                    {"record", "--duration", "-1"}};
+  for (std::vector<std::string> arguments : wrong) {
+    arguments.insert(arguments.end(), {"--out", folder.path("s")});
+    const CommandResult result = trigpoint(arguments);
+    EXPECT_EQ(result.exit_code, 2) << arguments.back() << result.output;
+    EXPECT_FALSE(fs::exists(folder.path("s"))) << result.output;
+  }
+  EXPECT_EQ(trigpoint({"info", "short", "--duration", "inf"}).exit_code, 2);
+  EXPECT_EQ(trigpoint({"play", "short", "--rate", "0"}).exit_code, 2);
+  EXPECT_THAT(trigpoint({"simulate", "shrt", "--out", folder.path("s")}).output,
+              HasSubstr("campus, "));
+}
+
+TEST(Command, a_seed_for_a_recorded_drive_is_refused) {
+  const TemporaryFolder folder;
+  write_bag(folder.path("bag"), {});
+  const CommandResult result = trigpoint({"info", folder.path("bag"), "--seed", "2"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.output, HasSubstr("--seed"));
+  EXPECT_EQ(trigpoint({"info", folder.path("bag/metadata.yaml")}).exit_code, 0);
+}
+
+TEST(Command, results_are_never_written_over_others) {
+  const TemporaryFolder folder;
+  for (const char* name : {"fused.tum", "truth.tum"}) {
+    const std::string used = folder.path(name) + ".d";
+    fs::create_directories(used);
+    tests::write_file(used + "/" + name, "mine");
+    for (const std::vector<std::string>& verb :
+         {std::vector<std::string>{"map", "short"}, {"simulate", "short"}, {"record"}}) {
+      std::vector<std::string> arguments = verb;
+      arguments.insert(arguments.end(), {"--duration", "1", "--out", used});
+      const CommandResult result = trigpoint(arguments);
+      EXPECT_EQ(result.exit_code, 2) << verb.front() << result.output;
+      EXPECT_THAT(result.output, HasSubstr(used));
+    }
+    EXPECT_EQ(tests::read_file(used + "/" + name), "mine");
+    const auto files = fs::directory_iterator(used);
+    EXPECT_EQ(std::distance(begin(files), end(files)), 1);
+  }
+}
+
+TEST(Command, an_interrupted_map_or_simulation_says_so_and_keeps_what_was_done) {
+  const TemporaryFolder folder;
+  tests::Command map({program(), "map", "campus", "--out", folder.path("s")});
+  tests::Command simulation({program(), "simulate", "campus", "--out", folder.path("d")});
+  std::this_thread::sleep_for(6s);
+  map.signal(SIGINT);
+  simulation.signal(SIGINT);
+  const CommandResult mapped = map.wait(60s);
+  const CommandResult simulated = simulation.wait(60s);
+  EXPECT_EQ(mapped.exit_code, 130) << mapped.output;
+  EXPECT_THAT(mapped.output, HasSubstr("interrupted"));
+  EXPECT_TRUE(fs::exists(folder.path("s/report.md")));
+  EXPECT_EQ(simulated.exit_code, 130) << simulated.output;
+  EXPECT_THAT(simulated.output, HasSubstr("interrupted"));
+  EXPECT_TRUE(fs::exists(folder.path("d/log/metadata.yaml")));
+  EXPECT_EQ(trigpoint({"info", folder.path("d")}).exit_code, 0);
+}
+
+TEST(Command, what_cannot_be_printed_is_a_failure) {
+  if (!fs::exists("/dev/full")) {
+    GTEST_SKIP() << "this system has no /dev/full";
+  }
+  const CommandResult result = run_command({"sh", "-c", program() + " config >/dev/full"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.output, HasSubstr("standard output"));
+}
+
+TEST(Command, export_refuses_what_is_no_session_and_a_format_there_is_not) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(
+      trigpoint(
+          {"simulate", "short", "--duration", "1", "--no-lidar", "--out", folder.path("drive")})
+          .exit_code,
+      0);
+  const CommandResult result =
+      trigpoint({"export", folder.path("drive"), "--out", folder.path("e")});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.output, HasSubstr("no session"));
+  EXPECT_EQ(
+      trigpoint({"export", folder.path("drive"), "--out", folder.path("e"), "--format", "ply"})
+          .exit_code,
+      2);
+}
+
+TEST(Command, a_play_to_nobody_fails_unless_that_is_allowed) {
+  const std::vector<std::string> play{"play", "short", "--duration", "1", "--wait", "1"};
+  const CommandResult refused = trigpoint(play);
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_THAT(refused.output, HasSubstr("nobody listens"));
+  std::vector<std::string> allowed = play;
+  allowed.push_back("--allow-no-reader");
+  EXPECT_EQ(trigpoint(allowed).exit_code, 0);
+}
+
+TEST(Command, two_players_on_one_domain_are_refused_with_the_other_one_s_process) {
+  const std::map<std::string, std::string> environment{{"ROS_DOMAIN_ID", tests::own_domain(52)}};
+  const tests::Command first({program(), "play", "short", "--rate", "1", "--allow-no-reader"},
+                             environment);
+  std::this_thread::sleep_for(4s);
+  for (const char* option : {"--check", "--wait=0"}) {
+    const CommandResult second =
+        run_command({program(), "play", "short", option}, 60s, environment);
+    EXPECT_EQ(second.exit_code, 1) << second.output;
+    EXPECT_THAT(second.output,
+                AllOf(HasSubstr("imu/data"),
+                      HasSubstr("process " + std::to_string(first.pid())),
+                      HasSubstr("ROS_DOMAIN_ID")));
+  }
+}
+
+TEST(Command, a_warning_that_repeats_is_told_once_with_its_number) {
+  const TemporaryFolder folder;
+  write_bag(folder.path("bag"), {.point_times = false});
+  const CommandResult result = trigpoint({"map", folder.path("bag"), "--out", folder.path("s")});
+  const std::string mark = "[points_without_time";
+  EXPECT_EQ(result.output.find(mark), result.output.rfind(mark)) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("points_without_time: 39 more like this"));
+}
+
 TEST(Command, config_prints_what_it_reads) {
   const TemporaryFolder folder;
   const CommandResult defaults = trigpoint({"config"});
@@ -256,7 +395,7 @@ TEST(Command, record_hears_what_play_says) {
   tests::Command recorder({program(), "record", "--out", folder.path("bag"), "--duration", "12"},
                           environment);
   const CommandResult played =
-      run_command({program(), "play", "short", "--duration", "3", "--rate", "1", "--wait", "2"},
+      run_command({program(), "play", "short", "--duration", "3", "--rate", "1", "--wait", "3"},
                   60s,
                   environment);
   EXPECT_EQ(played.exit_code, 0) << played.output;
@@ -271,6 +410,38 @@ TEST(Command, doctor_tells_when_nobody_is_on_the_bus) {
       {program(), "doctor", "--seconds", "1"}, 30s, {{"ROS_DOMAIN_ID", tests::own_domain(51)}});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.output, HasSubstr("nobody writes"));
+}
+
+TEST(Command, a_recording_of_silence_leaves_no_bag) {
+  const TemporaryFolder folder;
+  const CommandResult result =
+      trigpoint({"record", "--duration", "1", "--out", folder.path("bag")});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.output, HasSubstr("nothing was heard"));
+  EXPECT_FALSE(fs::exists(folder.path("bag")));
+}
+
+/// bringup/run's mistakes, all found before a process is started.
+TEST(BringupRun, finds_wrong_usage_before_it_makes_a_session) {
+  const TemporaryFolder folder;
+  const std::string session = folder.path("s");
+  tests::write_file(folder.path("c.yaml"), "bus: {network_interface: nope0}\n");
+  const std::vector<std::vector<std::string>> wrong{{"short", "--rate", "abc"},
+                                                    {"short", "--seed", "1.5"},
+                                                    {"short", "--duration", "abc"},
+                                                    {"short", "--config", folder.path("c.yaml")},
+                                                    {"nosuch"}};
+  for (const auto& each : wrong) {
+    std::vector<std::string> arguments{std::string(TRIGPOINT_SOURCE_DIR) + "/bringup/run"};
+    arguments.insert(arguments.end(), each.begin(), each.end());
+    arguments.insert(arguments.end(), {"--no-build", "--out", session});
+    const CommandResult result = run_command(
+        arguments,
+        60s,
+        {{"ROS_DOMAIN_ID", tests::own_domain(53)}, {"TRIGPOINT_BIN", TRIGPOINT_BIN_DIR}});
+    EXPECT_EQ(result.exit_code, 2) << each.back() << ": " << result.output;
+    EXPECT_FALSE(fs::exists(session)) << each.back();
+  }
 }
 
 }  // namespace

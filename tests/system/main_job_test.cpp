@@ -177,6 +177,7 @@ TEST(MainJobStopped, by_the_user_keeps_what_was_done_and_says_so) {
   job.signal(SIGINT);
   const CommandResult result = job.wait(60s);
   EXPECT_EQ(result.exit_code, 130) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("interrupted"));
   EXPECT_TRUE(fs::exists(session + "/map.pcd")) << result.output;
   EXPECT_TRUE(fs::exists(session + "/report.md"));
 }
@@ -193,6 +194,27 @@ TEST(MainJobStopped, by_the_death_of_a_process_names_it_and_keeps_what_was_done)
   EXPECT_EQ(result.exit_code, 1) << result.output;
   EXPECT_THAT(result.output, HasSubstr("trigpoint_lio_mapper ended"));
   EXPECT_TRUE(fs::exists(session + "/map.pcd")) << result.output;
+}
+
+TEST(MainJobStopped, by_its_own_death_leaves_no_process_behind_and_the_domain_free) {
+  const TemporaryFolder folder;
+  const std::string session = folder.path("session");
+  Command job({script(), kScenario, "--no-build", "--rate", "1", "--out", session}, environment(3));
+  ASSERT_TRUE(wait_for_scans(session, 10)) << job.output_so_far();
+  const CommandResult second = run_command(
+      {script(), kScenario, "--no-build", "--out", folder.path("b")}, 30s, environment(3));
+  EXPECT_EQ(second.exit_code, 1) << second.output;
+  EXPECT_THAT(second.output, HasSubstr("DDS domain"));
+  EXPECT_FALSE(fs::exists(folder.path("b")));
+  job.signal(SIGKILL);
+  const auto deadline = std::chrono::steady_clock::now() + 20s;
+  const auto anybody = [&] {
+    return run_command({"pgrep", "-f", "--", "--session " + session}, 10s).exit_code == 0;
+  };
+  while (anybody() && std::chrono::steady_clock::now() < deadline) {
+    std::this_thread::sleep_for(100ms);
+  }
+  EXPECT_FALSE(anybody());
 }
 
 }  // namespace

@@ -8,6 +8,8 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
+#include <map>
 #include <numeric>
 #include <set>
 #include <sstream>
@@ -69,6 +71,7 @@ class Loader final : public ConfigFields {
                         (path_.empty() ? "the document" : path_) +
                         " must be a mapping of keys to values");
     }
+    reject_repeated_keys();
   }
 
   void number(const std::string& key, double& value, const std::string&, Bounds bounds) override {
@@ -182,7 +185,7 @@ class Loader final : public ConfigFields {
       return;
     }
     for (const auto& pair : node_) {
-      const auto key = pair.first.as<std::string>();
+      const std::string key = text_of(pair.first);
       if (!known_.contains(key)) {
         fail(pair.first, key, "is not a known key" + suggestion(key));
       }
@@ -190,6 +193,25 @@ class Loader final : public ConfigFields {
   }
 
  private:
+  /// yaml-cpp keeps both of two equal keys and answers with the first.
+  void reject_repeated_keys() const {
+    if (!node_ || !node_.IsMap()) {
+      return;
+    }
+    std::map<std::string, int> line_of;
+    for (const auto& pair : node_) {
+      const std::string key = text_of(pair.first);
+      const auto [first, is_new] = line_of.emplace(key, pair.first.Mark().line + 1);
+      if (!is_new) {
+        fail(pair.first, key, "is given twice, first in line " + std::to_string(first->second));
+      }
+    }
+  }
+
+  static std::string text_of(const YAML::Node& key) {
+    return key.IsScalar() ? key.Scalar() : YAML::Dump(key);
+  }
+
   /// Undefined also for null: a key without a value leaves the default.
   YAML::Node find(const std::string& key) {
     known_.insert(key);
@@ -364,7 +386,7 @@ YAML::Node parse(const std::function<YAML::Node()>& load, const std::string& nam
     return load();
   } catch (const YAML::BadFile&) {
     throw ConfigError(name + ": cannot be read: no such file, or no permission");
-  } catch (const YAML::ParserException& error) {
+  } catch (const YAML::Exception& error) {
     throw ConfigError(name + ":" + std::to_string(error.mark.line + 1) +
                       ": is not YAML: " + error.msg);
   }
@@ -383,6 +405,9 @@ void visit(const YAML::Node& root,
 void load_config(const std::vector<std::string>& files,
                  const std::function<void(ConfigFields&)>& document) {
   for (const std::string& file : files) {
+    if (std::error_code ignored; std::filesystem::is_directory(file, ignored)) {
+      throw ConfigError(file + ": is a folder; a YAML file is expected");
+    }
     visit(parse([&file] { return YAML::LoadFile(file); }, file), file, document);
   }
 }

@@ -3,9 +3,14 @@
 #include "input.hpp"
 
 #include "trigpoint/export/session.hpp"
+#include "trigpoint/pipeline/lockstep.hpp"
 #include "trigpoint/simulator/scenario.hpp"
 #include "trigpoint/simulator/simulator.hpp"
 
+#include "number_checks.hpp"
+
+#include <algorithm>
+#include <array>
 #include <filesystem>
 #include <optional>
 
@@ -41,11 +46,33 @@ class WithTruth final : public recording::LogReader {
   std::string truth_;
 };
 
+/// As a YAML scalar.
+std::string quoted(const std::string& text) {
+  std::string yaml = "'";
+  for (const char c : text) {
+    yaml += c == '\'' ? "\'\'" : std::string(1, c);
+  }
+  return yaml + "'";
+}
+
 /// What a log knows by itself.
 struct Known {
   std::optional<RobotConfig> robot;
   std::optional<Datum> datum;  ///< the surveyed origin of a simulated world
 };
+
+void set_mode(SystemConfig& config, const std::string& mode) {
+  try {
+    load_config_text("fusion_gate:\n  mode: " + quoted(mode),
+                     "--mode",
+                     [&config](ConfigFields& fields) { describe(config, fields); });
+  } catch (const ConfigError& error) {
+    // "--mode:2: fusion_gate.mode must be one of ...": the line and the key say nothing here.
+    const std::string text = error.what();
+    const std::size_t rule = text.find("must be");
+    throw ConfigError(rule == std::string::npos ? text : "--mode " + text.substr(rule));
+  }
+}
 
 /// Defaults, then what the log knows, then the user's files.
 SystemConfig configure(const InputOptions& options, const Known& known) {
@@ -62,9 +89,7 @@ SystemConfig configure(const InputOptions& options, const Known& known) {
   }
   load(config, options.config_files);
   if (!options.mode.empty()) {
-    load_config_text("fusion_gate: {mode: " + options.mode + "}",
-                     "--mode",
-                     [&config](ConfigFields& fields) { describe(config, fields); });
+    set_mode(config, options.mode);
   }
   if (options.duration_s > 0.0) {
     config.log.duration_s = options.duration_s;
@@ -75,35 +100,67 @@ SystemConfig configure(const InputOptions& options, const Known& known) {
   return config;
 }
 
+/// Throws ConfigError when a core refuses its configuration as a whole.
+void check_cores(const SystemConfig& config) {
+  const pipeline::Lockstep cores(config.cores);
+}
+
+/// A topic that the user named and that is not in the log, whatever else is wrong with it.
+bool names_an_absent_topic(const std::string& log, const SystemConfig& config) {
+  recording::LogOptions any = config.log;
+  any.require_points = any.require_imu = any.require_fix = false;
+  const RobotConfig defaults;
+  const RobotConfig& robot = config.cores.robot;
+  try {
+    const auto topics = recording::open_log(log, robot, any)->summary().topics;
+    const auto is_absent = [&](const std::string RobotConfig::*topic) {
+      return robot.*topic != defaults.*topic &&
+             std::none_of(topics.begin(), topics.end(), [&](const auto& there) {
+               return there.topic == robot.*topic || there.topic == "/" + robot.*topic;
+             });
+    };
+    return is_absent(&RobotConfig::points_topic) || is_absent(&RobotConfig::imu_topic) ||
+           is_absent(&RobotConfig::fix_topic);
+  } catch (const recording::LogError&) {
+    return false;
+  }
+}
+
+std::unique_ptr<recording::LogReader> open_recorded(const std::string& log,
+                                                    const SystemConfig& config) {
+  try {
+    return recording::open_log(log, config.cores.robot, config.log);
+  } catch (const recording::LogError& error) {
+    if (names_an_absent_topic(log, config)) {
+      throw ConfigError(error.what());
+    }
+    throw;
+  }
+}
+
 Input open_scenario(const InputOptions& options, const std::string& truth_file) {
   const simulator::Scenario scenario = simulator::load_scenario(options.log);
-  std::optional<double> duration_s;
-  if (options.duration_s > 0.0) {
-    duration_s = options.duration_s;
-  }
-  auto reader = simulator::open_scenario(scenario, options.seed, duration_s);
+  const std::optional<double> duration_s = scenario_duration_s(options.duration_s);
+  Input input;
+  input.config = configure(options, {scenario.robot, scenario.datum});
+  check_cores(input.config);
+  auto reader = simulator::open_scenario(scenario, options.seed.value_or(1), duration_s);
   if (!truth_file.empty()) {
     exporter::create_session_folder(fs::path(truth_file).parent_path().string());
     reader->write_truth(truth_file);
   }
-  Input input;
-  input.config = configure(options, {reader->robot(), scenario.datum});
   input.reader = std::move(reader);
   return input;
 }
 
-/// The folder made by `trigpoint simulate` that `path` is or lies in (as its log/), if so.
+/// The folder made by `trigpoint simulate` that `path` is, or is the log/ of, if so.
 std::optional<fs::path> simulated_drive_of(const fs::path& path) {
   fs::path plain = fs::absolute(path).lexically_normal();
   if (!plain.has_filename()) {
     plain = plain.parent_path();  // "log/" as a shell completes it
   }
-  for (const fs::path& folder : {plain, plain.parent_path()}) {
-    if (is_simulated_drive(folder)) {
-      return folder;
-    }
-  }
-  return std::nullopt;
+  const fs::path folder = plain.filename() == "log" ? plain.parent_path() : plain;
+  return is_simulated_drive(folder) ? std::optional(folder) : std::nullopt;
 }
 
 Input open_simulated_drive(const InputOptions& options, const fs::path& folder) {
@@ -111,8 +168,7 @@ Input open_simulated_drive(const InputOptions& options, const fs::path& folder) 
       simulator::load_scenario((folder / "scenario.yaml").string());
   Input input;
   input.config = configure(options, {scenario.robot, scenario.datum});
-  input.reader =
-      recording::open_log((folder / "log").string(), input.config.cores.robot, input.config.log);
+  input.reader = open_recorded((folder / "log").string(), input.config);
   const fs::path truth = folder / "truth.tum";
   if (fs::is_regular_file(truth)) {
     input.reader = std::make_unique<WithTruth>(std::move(input.reader), truth.string());
@@ -126,7 +182,7 @@ Input open_recording(const InputOptions& options) {
   }
   Input input;
   input.config = configure(options, {});
-  input.reader = recording::open_log(options.log, input.config.cores.robot, input.config.log);
+  input.reader = open_recorded(options.log, input.config);
   if (const auto robot = input.reader->robot()) {
     input.config = configure(options, {robot, std::nullopt});
   }
@@ -150,20 +206,76 @@ void add_input_options(CLI::App& verb, InputOptions& options) {
                   "simulate, or a scenario (name or .yaml), which is streamed")
       ->required();
   add_config_options(verb, options);
-  verb.add_option("--seed", options.seed, "of the world and the noise, when LOG is a scenario")
-      ->capture_default_str();
+  verb.add_option(
+          "--seed", options.seed, "of the world and the noise, when LOG is a scenario (default 1)")
+      ->check(whole_number());
   verb.add_option("--duration", options.duration_s, "use only this much of the log, s")
-      ->check(CLI::NonNegativeNumber);
+      ->check(more_than_zero());
 }
 
-Input open_input(const InputOptions& options, const std::string& truth_file) {
+Input open_input(const InputOptions& given, const std::string& truth_file) {
+  InputOptions options = given;
+  if (fs::path(given.log).filename() == "metadata.yaml" && fs::exists(given.log)) {
+    options.log = fs::absolute(given.log).parent_path().string();  // a rosbag2's, by its index
+  }
   const bool recorded = fs::exists(options.log) && fs::path(options.log).extension() != ".yaml";
-  return !recorded && simulator::is_scenario(options.log) ? open_scenario(options, truth_file)
-                                                          : open_recording(options);
+  if (!recorded && simulator::is_scenario(options.log)) {
+    return open_scenario(options, truth_file);
+  }
+  if (!recorded) {
+    throw ConfigError(options.log + ": no such file or folder, nor a scenario; scenarios are: " +
+                      known_scenarios());
+  }
+  if (options.seed) {
+    throw ConfigError("--seed: " + options.log + " is a recorded drive; only a scenario has one");
+  }
+  Input input = open_recording(options);
+  check_cores(input.config);
+  return input;
 }
 
 SystemConfig load_config_of(const InputOptions& options) {
   return configure(options, {});
+}
+
+void refuse_used_folder(const std::string& out) {
+  namespace file = exporter::session_file;
+  constexpr std::array kResults{file::kConfig,
+                                file::kDatum,
+                                file::kRun,
+                                file::kFused,
+                                file::kLio,
+                                file::kGps,
+                                file::kTruth,
+                                file::kFixes,
+                                file::kKeyframes,
+                                file::kMap,
+                                "scenario.yaml",
+                                "metadata.yaml"};
+  for (const char* name : kResults) {
+    if (fs::is_regular_file(fs::path(out) / name)) {
+      throw ConfigError("--out: " + out + " holds results already (" + name +
+                        "); name another folder, or remove it");
+    }
+  }
+  if (fs::exists(out) && !fs::is_directory(out)) {
+    throw ConfigError("--out: " + out + " is no folder");
+  }
+}
+
+std::string known_scenarios() {
+  std::string names;
+  for (const std::string& name : simulator::shipped_scenarios()) {
+    names += (names.empty() ? "" : ", ") + name;
+  }
+  return names;
+}
+
+void require_scenario(const std::string& file_or_name) {
+  if (!simulator::is_scenario(file_or_name)) {
+    throw ConfigError(file_or_name + ": no such scenario file (.yaml), nor a scenario's name; " +
+                      "scenarios are: " + known_scenarios());
+  }
 }
 
 }  // namespace trigpoint::cli

@@ -9,6 +9,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,10 +18,10 @@ namespace trigpoint::cli {
 struct InputOptions {
   std::string log;  ///< bag, rosbag2, KITTI drive, simulated drive's folder, or scenario
   std::vector<std::string> config_files;
-  std::string mode;  ///< of the gate; empty: the configuration's
-  std::uint64_t seed{1};
-  double duration_s{0.0};  ///< 0: all
-  bool lenient{false};     ///< a log that lacks a topic is opened all the same
+  std::string mode;                   ///< of the gate; empty: the configuration's
+  std::optional<std::uint64_t> seed;  ///< of a scenario; 1 when left out
+  double duration_s{0.0};             ///< 0: all
+  bool lenient{false};                ///< a log that lacks a topic is opened all the same
 };
 
 /// A log that is open, and the configuration that goes with it: the user's files over what the log
@@ -36,11 +37,23 @@ void add_input_options(CLI::App& verb, InputOptions& options);
 /// Only --config and --mode.
 void add_config_options(CLI::App& verb, InputOptions& options);
 
-/// Throws LogError, ConfigError. A scenario is streamed without being written; its truth goes to
-/// `truth_file` (for scoring only) unless that is empty.
+/// Throws LogError, and ConfigError when what the user asked for is wrong: no such log, a topic
+/// that he named and that is not in it, a seed for a recorded drive, a core's configuration. A
+/// scenario is streamed without being written; its truth goes to `truth_file` (for scoring only)
+/// unless that is empty, and nothing is written before all is known to be right.
 Input open_input(const InputOptions& options, const std::string& truth_file = {});
 
 /// The configuration alone, without a log.
 SystemConfig load_config_of(const InputOptions& options);
+
+/// Throws ConfigError when a folder for new results holds something already that would be
+/// overwritten or mixed with them: a session, a simulated drive, a log.
+void refuse_used_folder(const std::string& out);
+
+/// "campus, short, ..."
+std::string known_scenarios();
+
+/// Throws ConfigError that lists the scenarios when there is none of that name.
+void require_scenario(const std::string& file_or_name);
 
 }  // namespace trigpoint::cli

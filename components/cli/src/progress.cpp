@@ -12,7 +12,8 @@ namespace trigpoint::cli {
 
 namespace {
 constexpr int kWidth = 40;
-}
+constexpr double kFirstEstimate_s = 3.0;  // before, opening and starting up tell nothing
+}  // namespace
 
 Progress::Progress(std::string what)
     : what_(std::move(what)),
@@ -38,16 +39,19 @@ void Progress::operator()(double share) {
 void Progress::draw(double share, double elapsed_s) const {
   const auto filled = static_cast<std::size_t>(std::lround(share * kWidth));
   const std::string bar = std::string(filled, '#') + std::string(kWidth - filled, '.');
-  const double left_s = share > 0.0 ? elapsed_s * (1.0 - share) / share : 0.0;
+  std::string left;
+  if (share > 0.0 && share < 1.0 && elapsed_s >= kFirstEstimate_s) {
+    left = ", " + std::to_string(std::lround(elapsed_s * (1.0 - share) / share)) + " s to go";
+  }
   std::fprintf(stderr,
-               "%s%s [%s] %3.0f %%  %.0f s, %.0f s to go%s",
+               "%s%s [%s] %3.0f %%  %.0f s%s%s",
                terminal_ ? "\r" : "",
                what_.c_str(),
                bar.c_str(),
                100.0 * share,
                elapsed_s,
-               left_s,
-               terminal_ ? "   " : "\n");
+               left.c_str(),
+               terminal_ ? "            " : "\n");
   std::fflush(stderr);
 }
 

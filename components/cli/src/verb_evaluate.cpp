@@ -9,8 +9,8 @@
 #include <cstdio>
 #include <iostream>
 #include <memory>
+#include <stdexcept>
 #include <string>
-#include <utility>
 
 namespace trigpoint::cli {
 
@@ -115,16 +115,18 @@ void print_outages(const std::string& fixes_file, const std::vector<PosePair>& p
   }
 }
 
-int run(const EvaluateOptions& options) {
-  const Trajectory estimate = exporter::read_trajectory(options.estimate);
-  const Trajectory reference = exporter::read_trajectory(options.reference);
-  for (const auto& [file, poses] : {std::pair(&options.estimate, estimate.size()),
-                                    std::pair(&options.reference, reference.size())}) {
-    if (poses == 0) {
-      std::cerr << "trigpoint evaluate: " << *file << " holds no poses\n";
-      return 1;
-    }
+/// Throws std::runtime_error for a file without a pose too.
+Trajectory read_poses(const std::string& file) {
+  Trajectory trajectory = exporter::read_trajectory(file);
+  if (trajectory.empty()) {
+    throw std::runtime_error(file + ": holds no pose");
   }
+  return trajectory;
+}
+
+int run(const EvaluateOptions& options) {
+  const Trajectory estimate = read_poses(options.estimate);
+  const Trajectory reference = read_poses(options.reference);
   const Association association = associate(estimate, reference);
   if (association.pairs.empty()) {
     std::cerr << "trigpoint evaluate: no pose of " << options.estimate

@@ -7,7 +7,9 @@
 
 #include "finish_session.hpp"
 #include "input.hpp"
+#include "interruption.hpp"
 #include "progress.hpp"
+#include "told_once.hpp"
 #include "verbs.hpp"
 
 #include <algorithm>
@@ -30,8 +32,7 @@ int exit_code_of(const pipeline::MapLogResult& result) {
     return 1;
   }
   if (result.stopped) {
-    std::cerr << "trigpoint map: stopped; what was done so far is in the session\n";
-    return 1;
+    return kInterrupted;
   }
   if (result.sweeps_used == 0) {
     std::cerr << "trigpoint map: none of " << result.sweeps_in_log
@@ -41,20 +42,40 @@ int exit_code_of(const pipeline::MapLogResult& result) {
   return 0;
 }
 
-int run(const MapOptions& options) {
+pipeline::MapLogResult map(const MapOptions& options) {
   const shell::StopSignal stop;
   const shell::EventLog log("map");
+  ToldOnce events([&log](const Event& event) { log(event); });
   Input input =
       open_input(options.input, exporter::path_in(options.out, exporter::session_file::kTruth));
-  Progress progress("mapping");
-  const pipeline::MapLogResult result = pipeline::map_log(*input.reader,
-                                                          input.config.cores,
-                                                          {options.out,
-                                                           print(input.config),
-                                                           mode_of(input.config),
-                                                           [&](double share) { progress(share); },
-                                                           [&](const Event& event) { log(event); },
-                                                           [&] { return stop.requested(); }});
+  pipeline::MapLogResult result;
+  {
+    Progress progress("mapping");
+    result = pipeline::map_log(*input.reader,
+                               input.config.cores,
+                               {options.out,
+                                print(input.config),
+                                mode_of(input.config),
+                                [&](double share) { progress(share); },
+                                [&](const Event& event) { events(event); },
+                                [&] { return stop.requested(); }});
+  }
+  std::cerr << events.summary();
+  return result;
+}
+
+int run(const MapOptions& options) {
+  refuse_used_folder(options.out);
+  const pipeline::MapLogResult result = map(options);
+  if (result.stopped) {
+    std::cerr << "trigpoint map: interrupted after " << result.data_s
+              << " s of the log; what was done so far is kept in " << options.out
+              << ", its map and report follow\n";
+  }
+  const LastWords last_words(
+      "\ntrigpoint map: interrupted before the report was done; trigpoint "
+      "report " +
+      options.out + " finishes it\n");
   const int finished = finish_session(options.out);
   std::cout << result.sweeps_used << " of " << result.sweeps_in_log << " sweeps used, "
             << result.data_s << " s of data in " << result.wall_s << " s ("

@@ -5,8 +5,11 @@
 #include "trigpoint/shell/shell.hpp"
 #include "trigpoint/shell/stop_signal.hpp"
 
+#include "bus_guard.hpp"
 #include "finish_session.hpp"
 #include "input.hpp"
+#include "interruption.hpp"
+#include "number_checks.hpp"
 #include "player.hpp"
 #include "progress.hpp"
 #include "verbs.hpp"
@@ -25,25 +28,10 @@ struct PlayVerbOptions {
   std::string session;
   std::string rate{"max"};
   int wait_s{10};
+  bool check{false};            ///< only look whether a whole run could begin
+  bool allow_others{false};     ///< who write the same topics
+  bool allow_no_reader{false};  ///< play to nobody
 };
-
-double rate_of(const std::string& text) {
-  if (text == "max") {
-    return 0.0;
-  }
-  std::size_t used = 0;
-  double rate = 0.0;
-  try {
-    rate = std::stod(text, &used);
-  } catch (const std::exception&) {
-    used = 0;
-  }
-  if (used != text.size() || !(rate > 0.0)) {
-    throw ConfigError("--rate must be 'max' or a number above 0 (1 is real time); is '" + text +
-                      "'");
-  }
-  return rate;
-}
 
 /// The player's part of the session; nothing without a folder.
 class SessionPart {
@@ -87,19 +75,57 @@ class SessionPart {
   std::optional<pipeline::LogPart> part_;
 };
 
+/// 0 when nobody else writes what is going to be written.
+int guard_bus(const PlayVerbOptions& options, const SystemConfig& config) {
+  if (options.allow_others) {
+    return 0;
+  }
+  const BusFindings findings =
+      look_for_writers(config, options.check ? Guarded::kSensorsAndCores : Guarded::kSensors);
+  if (findings.interrupted) {
+    std::cerr << "trigpoint play: interrupted before the first message\n";
+    return kInterrupted;
+  }
+  if (!findings.writers.empty()) {
+    std::cerr << "trigpoint play: " << refusal(findings, config) << "\n";
+    return 1;
+  }
+  return 0;
+}
+
+int exit_code_of(const recording::PlayResult& result, bool disk_failed) {
+  if (!result.log_error.empty()) {
+    std::cerr << "trigpoint play: the log breaks off: " << result.log_error << "\n";
+    return 1;
+  }
+  if (result.stopped) {
+    std::cerr << "trigpoint play: interrupted; the rest of the log was not played\n";
+    return kInterrupted;
+  }
+  return disk_failed ? 1 : 0;
+}
+
 int run(const PlayVerbOptions& options) {
+  const double rate = rate_of(options.rate);
+  if (options.check) {
+    return guard_bus(options, open_input(options.input).config);
+  }
   const shell::StopSignal stop;
   const shell::EventLog log("play");
   const std::string truth =
       options.session.empty() ? ""
                               : exporter::path_in(options.session, exporter::session_file::kTruth);
   Input input = open_input(options.input, truth);
+  if (const int code = guard_bus(options, input.config); code != 0) {
+    return code;
+  }
   SessionPart session(options.session, log);
   Progress progress("playing");
   recording::PlayOptions play;
   play.robot = input.config.cores.robot;
   play.bus = input.config.bus;
-  play.rate = rate_of(options.rate);
+  play.rate = rate;
+  play.allow_no_reader = options.allow_no_reader;
   play.wait_for_peers = std::chrono::seconds(options.wait_s);
   play.progress = [&](double share) { progress(share); };
   play.on_entry = [&](const recording::LogEntry& entry) { session.on_entry(entry); };
@@ -113,10 +139,7 @@ int run(const PlayVerbOptions& options) {
   std::cout << "played " << result.sweeps << " sweeps, " << result.imu << " IMU samples, "
             << result.fixes << " fixes in " << wall_s << " s; " << result.unanswered
             << " waits for an answer were given up\n";
-  if (!result.log_error.empty()) {
-    std::cerr << "trigpoint play: the log breaks off: " << result.log_error << "\n";
-  }
-  return result.log_error.empty() && !result.stopped && !session.failed() ? 0 : 1;
+  return exit_code_of(result, session.failed());
 }
 
 }  // namespace
@@ -136,7 +159,16 @@ void add_play(CLI::App& app, Chosen& chosen) {
   verb->add_option("--wait",
                    options->wait_s,
                    "wait this long for the three processes before the first message, s")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->check(whole_number());
+  verb->add_flag("--check",
+                 options->check,
+                 "play nothing: tell whether arguments, configuration and log are right and nobody "
+                 "else writes the topics of a run");
+  verb->add_flag("--allow-others",
+                 options->allow_others,
+                 "also when others write the sensors' topics or the clock");
+  verb->add_flag("--allow-no-reader", options->allow_no_reader, "also when nobody listens");
   verb->callback([options, &chosen] { chosen = [options] { return run(*options); }; });
 }
 

@@ -3,11 +3,16 @@
 #include "trigpoint/shell/shell.hpp"
 
 #include "input.hpp"
+#include "interruption.hpp"
+#include "number_checks.hpp"
 #include "recorder.hpp"
 #include "verbs.hpp"
 #include <unistd.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <numeric>
@@ -53,7 +58,32 @@ std::uint64_t total(const std::vector<recording::TopicSummary>& topics) {
       });
 }
 
+namespace fs = std::filesystem;
+
+void require_empty_or_new(const std::string& out) {
+  std::error_code error;
+  if (fs::exists(out) && (!fs::is_directory(out) || !fs::is_empty(out, error))) {
+    throw ConfigError("--out: " + out +
+                      " exists and is not an empty folder; a recording is never written over "
+                      "something else");
+  }
+}
+
+/// An empty bag is of no use; a folder that was there before stays.
+void remove_bag(const std::string& out, bool was_there) {
+  std::error_code error;
+  if (!was_there) {
+    fs::remove_all(out, error);
+    return;
+  }
+  for (const auto& entry : fs::directory_iterator(out, error)) {
+    fs::remove(entry.path(), error);
+  }
+}
+
 int run(const RecordVerbOptions& options) {
+  require_empty_or_new(options.out);
+  const bool was_there = fs::exists(options.out);
   const shell::EventLog log("record");
   const SystemConfig config = load_config_of(options.input);
   recording::RecordOptions record;
@@ -70,7 +100,9 @@ int run(const RecordVerbOptions& options) {
                  topics.size(),
                  terminal ? "  " : "\n");
   };
+  const auto begin = std::chrono::steady_clock::now();
   const recording::RecordResult result = recording::record(record);
+  const std::chrono::duration<double> recorded = std::chrono::steady_clock::now() - begin;
   std::cerr << "\n";
   for (const recording::TopicSummary& topic : result.topics) {
     std::cout << topic.topic << "  " << topic.type << "  " << topic.messages << "\n";
@@ -81,8 +113,14 @@ int run(const RecordVerbOptions& options) {
   }
   if (total(result.topics) == 0) {
     std::cerr << "trigpoint record: nothing was heard on DDS domain " << bus::domain_of(config.bus)
-              << "; trigpoint doctor tells who is there\n";
+              << ", so no bag is left; trigpoint doctor tells who is there\n";
+    remove_bag(options.out, was_there);
     return 1;
+  }
+  if (recorded.count() < options.duration_s) {
+    std::cerr << "trigpoint record: interrupted after " << recorded.count() << " of "
+              << options.duration_s << " s; the bag is whole up to there\n";
+    return kInterrupted;
   }
   return result.dropped == 0 ? 0 : 1;
 }
@@ -93,11 +131,11 @@ void add_record(CLI::App& app, Chosen& chosen) {
   CLI::App* verb =
       app.add_subcommand("record", "Write what is on the bus into a rosbag2, until Ctrl-C");
   const auto options = std::make_shared<RecordVerbOptions>();
-  verb->add_option("--out", options->out, "folder of the bag; must not exist")->required();
+  verb->add_option("--out", options->out, "folder of the bag; new or empty")->required();
   verb->add_option("--config", options->input.config_files, "YAML with the keys to change");
   verb->add_option("--topic", options->topics, "only this topic; may be repeated");
   verb->add_option("--duration", options->duration_s, "stop by itself after this time, s")
-      ->check(CLI::NonNegativeNumber);
+      ->check(more_than_zero());
   verb->callback([options, &chosen] { chosen = [options] { return run(*options); }; });
 }
 

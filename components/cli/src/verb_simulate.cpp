@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
+#include "trigpoint/shell/stop_signal.hpp"
 #include "trigpoint/simulator/scenario.hpp"
 #include "trigpoint/simulator/simulator.hpp"
 
+#include "input.hpp"
+#include "interruption.hpp"
+#include "number_checks.hpp"
 #include "progress.hpp"
 #include "verbs.hpp"
 
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -22,28 +27,42 @@ struct SimulateOptions {
   bool no_lidar{false};
 };
 
-std::string known_scenarios() {
-  std::string names;
-  for (const std::string& name : simulator::shipped_scenarios()) {
-    names += (names.empty() ? "" : ", ") + name;
+/// Thrown out of the simulation between two messages: the log is closed on the way.
+struct Interrupted {};
+
+void simulate(const SimulateOptions& options,
+              const simulator::Scenario& scenario,
+              std::optional<double> duration_s) {
+  const shell::StopSignal stop;
+  Progress progress("simulating");
+  const auto tell_or_stop = [&](double share) {
+    if (stop.requested()) {
+      throw Interrupted();
+    }
+    progress(share);
+  };
+  try {
+    simulator::simulate(
+        scenario, options.seed, duration_s, options.out, tell_or_stop, {!options.no_lidar});
+  } catch (const std::exception&) {
+    std::error_code not_empty;
+    std::filesystem::remove(options.out, not_empty);  // leaves whatever is in it
+    throw;
   }
-  return names;
 }
 
 int run(const SimulateOptions& options) {
+  require_scenario(options.scenario);
   const simulator::Scenario scenario = simulator::load_scenario(options.scenario);
-  std::optional<double> duration_s;
-  if (options.duration_s > 0.0) {
-    duration_s = options.duration_s;
-  }
-  {
-    Progress progress("simulating");
-    simulator::simulate(scenario,
-                        options.seed,
-                        duration_s,
-                        options.out,
-                        [&](double share) { progress(share); },
-                        {!options.no_lidar});
+  const std::optional<double> duration_s = scenario_duration_s(options.duration_s);
+  refuse_used_folder(options.out);
+  refuse_used_folder((std::filesystem::path(options.out) / "log").string());
+  try {
+    simulate(options, scenario, duration_s);
+  } catch (const Interrupted&) {
+    std::cerr << "trigpoint simulate: interrupted; " << options.out
+              << "/log is whole up to there and can be used\n";
+    return kInterrupted;
   }
   std::cout << options.out << ": log (rosbag2), truth.tum, scenario.yaml, robot.yaml\n"
             << "next: trigpoint map " << options.out << " --out SESSION\n";
@@ -58,10 +77,12 @@ void add_simulate(CLI::App& app, Chosen& chosen) {
   const auto options = std::make_shared<SimulateOptions>();
   verb->add_option("SCENARIO", options->scenario, "a .yaml file, or one of: " + known_scenarios())
       ->required();
-  verb->add_option("--seed", options->seed, "of the world and of the noise")->capture_default_str();
+  verb->add_option("--seed", options->seed, "of the world and of the noise")
+      ->capture_default_str()
+      ->check(whole_number());
   verb->add_option("--duration", options->duration_s, "s; the scenario's own when left out")
-      ->check(CLI::NonNegativeNumber);
-  verb->add_option("--out", options->out, "folder, created when missing; must not hold a log yet")
+      ->check(more_than_zero());
+  verb->add_option("--out", options->out, "folder, created when missing; must not hold results yet")
       ->required();
   verb->add_flag("--no-lidar", options->no_lidar, "IMU and GPS only, at a hundred times real time");
   verb->callback([options, &chosen] { chosen = [options] { return run(*options); }; });

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <stdexcept>
 #include <thread>
 #include <variant>
 
@@ -61,7 +62,16 @@ class Player {
     while (!complete() && WallClock::now() < deadline && !stop_requested()) {
       std::this_thread::sleep_for(20ms);
     }
-    if (!complete()) {
+    refuse_two_of_a_kind();
+    if (!options_.allow_no_reader && !stop_requested() &&
+        points_.matched() + imu_.matched() + fixes_.matched() == 0) {
+      throw std::runtime_error("nobody listens to " + options_.robot.points_topic + ", " +
+                               options_.robot.imu_topic + " or " + options_.robot.fix_topic +
+                               " on DDS domain " + std::to_string(bus::domain_of(options_.bus)) +
+                               " after " + std::to_string(options_.wait_for_peers.count()) +
+                               " s; start the three processes first (is ROS_DOMAIN_ID the same?)");
+    }
+    if (!complete() && !stop_requested()) {
       tell("peers_missing",
            "after " + std::to_string(options_.wait_for_peers.count()) + " s: points has " +
                std::to_string(points_.matched()) + " readers (1 expected), imu " +
@@ -101,6 +111,18 @@ class Player {
   PlayResult result;
 
  private:
+  void refuse_two_of_a_kind() const {
+    const int mappers = lio_status_.matched();
+    const int gates = fusion_status_.matched();
+    if (mappers > 1 || gates > 1) {
+      throw std::runtime_error(std::to_string(mappers) + " mappers and " + std::to_string(gates) +
+                               " gates are on DDS domain " +
+                               std::to_string(bus::domain_of(options_.bus)) +
+                               ", whose results would be mixed; end the others, or take another "
+                               "ROS_DOMAIN_ID");
+    }
+  }
+
   void send(const PointCloudMessage& cloud) {
     if (options_.rate == 0.0) {
       await("a sweep", lio_status_.matched(), [this] {

@@ -24,6 +24,7 @@ struct PlayOptions {
   double rate{0.0};
   /// Waits this long for a mapper, a filter and a gate before the first message.
   std::chrono::seconds wait_for_peers{10};
+  bool allow_no_reader{false};  ///< play on when nobody at all listens
   /// An answer that does not come within this time is given up, counted and told.
   std::chrono::milliseconds patience{3000};
   std::function<void(double)> progress;           ///< may be empty
@@ -42,7 +43,8 @@ struct PlayResult {
 };
 
 /// Publishes points, imu/data, gps/fix (under the names in `robot`) and clock. Throws
-/// std::runtime_error when the bus cannot be joined.
+/// std::runtime_error when the bus cannot be joined, when nobody listens (unless that is allowed),
+/// or when two mappers or two gates do, whose results would be mixed.
 PlayResult play(LogReader& log, const PlayOptions& options);
 
 }  // namespace trigpoint::recording

@@ -141,5 +141,23 @@ TEST(RobotConfig, the_lidar_s_pose_follows_from_its_angles) {
   EXPECT_LT((ahead_of_lidar - Eigen::Vector3d(0.5, 1.0, 1.0)).norm(), 1e-12);
 }
 
+TEST(Config, a_key_that_is_given_twice_is_refused_with_both_lines) {
+  const std::string inner = error_of("sample:\n  gain: 1.0\n  count: 2\n  gain: 3.0\n");
+  EXPECT_THAT(inner, HasSubstr("file.yaml:4: sample.gain is given twice, first in line 2"));
+  EXPECT_THAT(error_of("sample: {count: 2}\nsample: {count: 3}\n"),
+              HasSubstr("file.yaml:2: sample is given twice, first in line 1"));
+  EXPECT_EQ(error_of("sample: {count: 2, inner: {inner_s: 0.5}}\n"), "no error");
+}
+
+TEST(Config, a_folder_in_place_of_a_file_is_named) {
+  Sample s;
+  try {
+    load_config({"/tmp"}, document(s));
+    FAIL() << "accepted";
+  } catch (const ConfigError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("/tmp: is a folder"));
+  }
+}
+
 }  // namespace
 }  // namespace trigpoint

@@ -6,6 +6,8 @@
 #include "trigpoint/simulator/simulator.hpp"
 
 #include "../export/scratch_folder.hpp"
+#include "number_checks.hpp"
+#include "told_once.hpp"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -47,9 +49,15 @@ TEST(InputArguments, are_a_log_and_what_is_done_with_it) {
 
 TEST(InputArguments, without_a_log_or_with_a_wrong_number_are_a_usage_error) {
   EXPECT_THROW(parse("--seed 7"), CLI::RequiredError);
-  EXPECT_THROW(parse("drive.bag --seed seven"), CLI::ConversionError);
+  EXPECT_THROW(parse("drive.bag --seed seven"), CLI::ValidationError);
   EXPECT_THROW(parse("drive.bag --duration long"), CLI::ParseError);
-  EXPECT_THROW(parse("drive.bag --duration -3"), CLI::ValidationError);
+  for (const char* wrong : {"-3", "0", "nan", "inf", "1e400"}) {
+    EXPECT_THROW(parse(std::string("drive.bag --duration ") + wrong), CLI::ValidationError)
+        << wrong;
+  }
+  for (const char* wrong : {"-1", "1.5", "1e23", "99999999999999999999"}) {
+    EXPECT_THROW(parse(std::string("drive.bag --seed ") + wrong), CLI::ValidationError) << wrong;
+  }
   EXPECT_THROW(parse("drive.bag other.bag"), CLI::ExtrasError);
 }
 
@@ -91,6 +99,44 @@ TEST(Input, refuses_a_mode_that_there_is_not) {
   options.mode = "gentle";
   EXPECT_THAT(error_of([&] { load_config_of(options); }),
               AllOf(HasSubstr("--mode"), HasSubstr("gentle"), HasSubstr("hard")));
+}
+
+TEST(Input, with_a_wrong_configuration_writes_no_truth) {
+  const ScratchFolder folder;
+  InputOptions options = of("short");
+  options.mode = "gentle";
+  EXPECT_NE(error_of([&] { open_input(options, folder.file("session/truth.tum")); }), "");
+  EXPECT_FALSE(std::filesystem::exists(folder.file("session")));
+}
+
+TEST(UsedFolder, is_refused_and_an_empty_or_new_one_is_not) {
+  const ScratchFolder folder;
+  EXPECT_EQ(error_of([&] { refuse_used_folder(folder.path()); }), "");
+  EXPECT_EQ(error_of([&] { refuse_used_folder(folder.file("new")); }), "");
+  test::write_all(folder.file("datum.yaml"), "");
+  EXPECT_THAT(error_of([&] { refuse_used_folder(folder.path()); }), HasSubstr("datum.yaml"));
+  EXPECT_THAT(error_of([&] { refuse_used_folder(folder.file("datum.yaml")); }),
+              HasSubstr("no folder"));
+}
+
+TEST(ToldOnce, hands_on_the_first_of_each_kind_and_counts_the_others) {
+  std::vector<std::string> told;
+  ToldOnce events([&told](const Event& event) { told.push_back(event.text); });
+  for (const char* text : {"a", "b", "c"}) {
+    events({Severity::kWarning, 0, "same", text});
+    events({Severity::kInfo, 0, "news", text});
+  }
+  events({Severity::kError, 0, "alone", "d"});
+  EXPECT_THAT(told, ElementsAre("a", "a", "b", "c", "d"));
+  EXPECT_EQ(events.summary(), "  same: 2 more like this\n");
+}
+
+TEST(Rate, is_max_or_a_number_above_zero) {
+  EXPECT_EQ(rate_of("max"), 0.0);
+  EXPECT_EQ(rate_of("2.5"), 2.5);
+  for (const char* wrong : {"0", "-1", "nan", "inf", "abc", "1x", ""}) {
+    EXPECT_THROW(rate_of(wrong), ConfigError) << wrong;
+  }
 }
 
 TEST(Input, takes_a_simulated_drives_folder_or_the_log_within_it) {

@@ -74,6 +74,10 @@ TEST(Progress, fills_the_bar_by_the_share) {
               HasSubstr("[" + std::string(20, '#') + std::string(20, '.') + "]  50 %"));
 }
 
+TEST(Progress, gives_no_estimate_before_it_can_know) {
+  EXPECT_THAT(written_by([] { Progress("mapping")(0.001); }), Not(HasSubstr("to go")));
+}
+
 TEST(Progress, tells_the_end_once_and_only_when_it_is_reached) {
   const std::string whole = written_by([] {
     Progress progress("mapping");

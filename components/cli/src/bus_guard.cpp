@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "bus_guard.hpp"
+
+#include "trigpoint/bus/topics.hpp"
+
+#include "bus_survey.hpp"
+#include "known_topics.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <set>
+
+namespace trigpoint::cli {
+
+namespace {
+
+namespace fs = std::filesystem;
+namespace topics = bus::topics;
+
+// Processes on one computer find each other within about 0.2 s; the rest is for a loaded one.
+constexpr double kListen_s = 1.5;
+
+std::vector<recording::KnownTopic> guarded_topics(const RobotConfig& robot, Guarded guarded) {
+  std::set<std::string> names{robot.points_topic, robot.imu_topic, robot.fix_topic};
+  names.emplace(topics::clock.name);
+  if (guarded == Guarded::kSensorsAndCores) {
+    names.emplace(topics::gps_odometry.name);
+    names.emplace(topics::lio_odometry.name);
+    names.emplace(topics::fusion_odometry.name);
+  }
+  std::vector<recording::KnownTopic> all = recording::known_topics(robot);
+  std::erase_if(all, [&names](const auto& topic) { return !names.contains(topic.name); });
+  return all;
+}
+
+/// The name of the program that process `number` runs; empty when there is none to be read.
+std::string program_of(unsigned number) {
+  std::ifstream file("/proc/" + std::to_string(number) + "/cmdline", std::ios::binary);
+  std::string program;
+  std::getline(file, program, '\0');
+  return fs::path(program).filename().string();
+}
+
+std::vector<recording::TopicSurvey> listen(const SystemConfig& config, Guarded guarded) {
+  try {
+    recording::SurveyOptions survey;
+    survey.bus = config.bus;
+    survey.topics = guarded_topics(config.cores.robot, guarded);
+    survey.duration_s = kListen_s;
+    return recording::survey_bus(survey);
+  } catch (const ConfigError&) {
+    throw;
+  } catch (const std::runtime_error& error) {
+    if (std::string(error.what()).starts_with("bus.")) {
+      throw ConfigError(error.what());  // names a key of the configuration
+    }
+    throw;
+  }
+}
+
+}  // namespace
+
+BusFindings look_for_writers(const SystemConfig& config, Guarded guarded) {
+  const auto begin = std::chrono::steady_clock::now();
+  const std::vector<recording::TopicSurvey> surveys = listen(config, guarded);
+  const std::chrono::duration<double> listened = std::chrono::steady_clock::now() - begin;
+  BusFindings findings;
+  findings.interrupted = listened.count() < kListen_s;
+  for (const recording::TopicSurvey& survey : surveys) {
+    std::set<std::string> owners;
+    for (const auto& guids : {survey.writers, survey.silent_writers}) {
+      std::transform(guids.begin(), guids.end(), std::inserter(owners, owners.end()), owner_of);
+    }
+    std::string list;
+    for (const std::string& owner : owners) {
+      list += (list.empty() ? "" : ", ") + owner;
+    }
+    if (!list.empty()) {
+      findings.writers.push_back(survey.topic.name + ": " + list);
+    }
+  }
+  return findings;
+}
+
+std::string refusal(const BusFindings& findings, const SystemConfig& config) {
+  std::string text =
+      "others write already on DDS domain " + std::to_string(bus::domain_of(config.bus)) + ":\n";
+  for (const std::string& line : findings.writers) {
+    text += "  " + line + "\n";
+  }
+  return text + "Both would be mixed: end them, or take another domain (ROS_DOMAIN_ID=N).";
+}
+
+std::string owner_of(const std::string& writer_guid) {
+  // Fast DDS: bytes 4 and 5 of a GUID are the low 16 bits of the process number, lowest first.
+  constexpr std::size_t kPidDigit = 8;
+  constexpr const char* kFastDds = "010f";
+  if (writer_guid.size() >= kPidDigit + 4 && writer_guid.starts_with(kFastDds)) {
+    const auto byte = [&](std::size_t digit) {
+      return static_cast<unsigned>(std::stoul(writer_guid.substr(digit, 2), nullptr, 16));
+    };
+    const unsigned number = byte(kPidDigit) + 256 * byte(kPidDigit + 2);
+    if (const std::string program = program_of(number); program.starts_with("trigpoint")) {
+      return program + " (process " + std::to_string(number) + ")";
+    }
+  }
+  return "another program (DDS writer " + writer_guid.substr(0, 24) + ")";
+}
+
+}  // namespace trigpoint::cli
