@@ -32,6 +32,12 @@ class WithTruth final : public recording::LogReader {
 
   double progress() const override { return reader_->progress(); }
 
+  std::vector<recording::Undecodable> undecodable() const override {
+    return reader_->undecodable();
+  }
+
+  Events take_events() override { return reader_->take_events(); }
+
   std::optional<std::string> truth_file() const override { return truth_; }
 
   std::optional<RobotConfig> robot() const override { return reader_->robot(); }

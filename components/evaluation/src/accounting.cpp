@@ -51,7 +51,8 @@ StreamCounts counts_of_stream(const ProgramCounts& program, const std::string& s
 }
 
 std::string reasons_text(const StreamCounts& counts) {
-  std::string text;
+  const auto undecodable = counts.get("undecodable").value_or(0);
+  std::string text = undecodable > 0 ? "undecodable " + std::to_string(undecodable) : "";
   for (const auto& [reason, count] : counts.reasons) {
     text += (text.empty() ? "" : ", ") + reason + " " + std::to_string(count);
   }
@@ -85,9 +86,14 @@ void find_losses(const ProgramCounts& program,
   const auto in_log = counts.get("in_log");
   const auto put_out = counts.get("published");
   const auto withheld = counts.get("withheld").value_or(0);
-  if (in_log && put_out && *put_out + withheld != *in_log) {
+  const auto undecodable = counts.get("undecodable").value_or(0);
+  if (in_log && put_out && *put_out + withheld + undecodable != *in_log) {
     findings.losses.push_back(program.program + " published " +
-                              of(*put_out, *in_log - withheld, stream));
+                              of(*put_out, *in_log - withheld - undecodable, stream));
+  }
+  if (in_log && undecodable > 0) {
+    findings.refusals.push_back(program.program + " skipped " + of(undecodable, *in_log, stream) +
+                                " (undecodable: damaged in the log)");
   }
   const auto received = counts.get("received");
   if (received && sent && *received != *sent) {
