@@ -104,12 +104,11 @@ std::optional<fs::path> simulated_drive_of(const fs::path& path) {
   if (!plain.has_filename()) {
     plain = plain.parent_path();  // "log/" as a shell completes it
   }
-  for (const fs::path& folder : {plain, plain.parent_path()}) {
-    if (is_simulated_drive(folder)) {
-      return folder;
-    }
+  if (is_simulated_drive(plain)) {
+    return plain;
   }
-  return std::nullopt;
+  const bool is_its_log = plain.filename() == "log" && is_simulated_drive(plain.parent_path());
+  return is_its_log ? std::optional(plain.parent_path()) : std::nullopt;
 }
 
 Input open_simulated_drive(const InputOptions& options, const fs::path& folder) {
@@ -163,7 +162,9 @@ void add_input_options(CLI::App& verb, InputOptions& options) {
 }
 
 Input open_input(const InputOptions& options, const std::string& truth_file) {
-  const bool recorded = fs::exists(options.log) && fs::path(options.log).extension() != ".yaml";
+  const fs::path path = options.log;
+  const bool recorded =
+      fs::exists(path) && (path.extension() != ".yaml" || path.filename() == "metadata.yaml");
   return !recorded && simulator::is_scenario(options.log) ? open_scenario(options, truth_file)
                                                           : open_recording(options);
 }
