@@ -119,10 +119,11 @@ void GyroUnitCheck::judge_tilt() {
   if (claimed_rad > kClaimedTilt_rad && measured_rad < kMeasuredTilt_rad) {
     constexpr double kDegrees = 180.0 / std::numbers::pi;
     contradiction_ =
-        print("the gyro's rates would tilt the robot by %.0f deg within a second, but the specific "
-              "force keeps its direction within %.0f deg",
-              claimed_rad * kDegrees,
-              measured_rad * kDegrees) +
+        print(
+            "the gyro's rates would tilt the robot by %.0f deg within a second, but the specific "
+            "force keeps its direction within %.0f deg",
+            claimed_rad * kDegrees,
+            measured_rad * kDegrees) +
         kRemedy;
   }
 }

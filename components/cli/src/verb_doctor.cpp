@@ -103,8 +103,8 @@ int examine_entries(recording::LogReader& reader, const RobotConfig& robot) {
     std::cout << "  ! " << event.text << "\n";
     wrong = 1;
   }
-  return wrong | tell(robot.points_topic, points.remarks()) |
-         tell(robot.imu_topic, imu.remarks()) | tell(robot.fix_topic, fixes.remarks());
+  return wrong | tell(robot.points_topic, points.remarks()) | tell(robot.imu_topic, imu.remarks()) |
+         tell(robot.fix_topic, fixes.remarks());
 }
 
 std::string without_slash(const std::string& topic) {

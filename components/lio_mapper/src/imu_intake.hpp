@@ -26,8 +26,8 @@ class Tally {
   std::vector<NamedCount> counts_;
 };
 
-/// Lets samples in that are finite, possible and newer than the last one, turned into base axes. Once
-/// the gyro is found to speak in degrees a second, none comes in any more.
+/// Lets samples in that are finite, possible and newer than the last one, turned into base axes.
+/// Once the gyro is found to speak in degrees a second, none comes in any more.
 class ImuIntake {
  public:
   explicit ImuIntake(const Eigen::Quaterniond& q_base_imu) : q_base_imu_(q_base_imu) {}

@@ -61,7 +61,8 @@ void MeasurementChecks::take(const GnssFix& fix) {
   }
   if (!fix.covariance_enu_m2.allFinite()) {
     note("a covariance that is not finite (NaN or infinite)");
-  } else if (fix.covariance_type == CovarianceType::kUnknown || fix.covariance_enu_m2.trace() <= 0.0) {
+  } else if (fix.covariance_type == CovarianceType::kUnknown ||
+             fix.covariance_enu_m2.trace() <= 0.0) {
     note("the fix says nothing of its covariance: a class default is assumed");
   }
 }

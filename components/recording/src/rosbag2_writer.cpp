@@ -41,12 +41,12 @@ constexpr auto kTransaction = std::chrono::seconds(1);
 /// A transaction waits in the write-ahead log, which is emptied into the database after each: a log
 /// that grew with the drive could not be emptied any more on a full disk.
 constexpr std::uint64_t kTransaction_bytes = 4U << 20U;
-/// Kept free for emptying the write-ahead log once more when the disk is full: what it may hold, and
-/// as much again for pages of the index, metadata.yaml and SQLite's shared memory.
+/// Kept free for emptying the write-ahead log once more when the disk is full: what it may hold,
+/// and as much again for pages of the index, metadata.yaml and SQLite's shared memory.
 constexpr std::uint64_t kReserveOverTransaction = 2;
 
-/// Room on the disk that belongs to nobody else until it is given back: a file without a name, which
-/// also vanishes with a killed process.
+/// Room on the disk that belongs to nobody else until it is given back: a file without a name,
+/// which also vanishes with a killed process.
 class DiskReserve {
  public:
   explicit DiskReserve(const fs::path& folder) : name_((folder / "reserve").string()) {}

@@ -15,16 +15,18 @@
 namespace trigpoint {
 
 /// Two contradictions within about a second, neither of which a robot on the ground reaches:
-/// - it would turn on average by more than a full turn a second (a gyro in deg/s says so from a real
+/// - it would turn on average by more than a full turn a second (a gyro in deg/s says so from a
+/// real
 ///   0.11 rad/s on);
-/// - it would tilt by more than 60 degrees, while the specific force, which is about gravity all the
+/// - it would tilt by more than 60 degrees, while the specific force, which is about gravity all
+/// the
 ///   time, keeps its direction within 20 degrees (a gyro in deg/s says so from a real 1 degree on).
-/// Vibration averages out of both. A robot that neither turns nor tilts is not found out; nor need it
-/// be, as a gyro of zero is zero in every unit.
+/// Vibration averages out of both. A robot that neither turns nor tilts is not found out; nor need
+/// it be, as a gyro of zero is zero in every unit.
 class GyroUnitCheck {
  public:
-  /// One sample, in any axes that stay the same. A sentence with the numbers and the remedy from the
-  /// first contradiction on, for every later sample, too.
+  /// One sample, in any axes that stay the same. A sentence with the numbers and the remedy from
+  /// the first contradiction on, for every later sample, too.
   const std::optional<std::string>& add(Nanoseconds stamp_ns,
                                         const Eigen::Vector3d& gyro_radps,
                                         const Eigen::Vector3d& accel_mps2);
