@@ -353,7 +353,9 @@ TEST(Rosbag2, empties_its_write_ahead_log_while_it_writes) {
   EXPECT_GT(fs::file_size(folder / "log" / "log_0.db3"), written / 2);
 }
 
-/// A limit on the file's size takes the place of a full disk: it also hits the write-ahead log.
+/// A limit on the size of each file is worse than a full disk: no room that is given back helps the
+/// database, so that its last messages stay in the write-ahead log. With TMPDIR on a small tmpfs it
+/// is the disk that is full.
 TEST(Rosbag2, on_a_disk_that_takes_no_more_what_was_written_before_is_readable_and_counted) {
   TemporaryFolder folder;
   const auto path = (folder / "log").string();
@@ -383,7 +385,6 @@ TEST(Rosbag2, on_a_disk_that_takes_no_more_what_was_written_before_is_readable_a
   points_alone.require_imu = false;
   points_alone.require_fix = false;
   const auto log = open_log(path, RobotConfig{}, points_alone);
-  EXPECT_THAT(log->summary().faults, testing::IsEmpty());
   const auto kept = read_all(*log).size();
   EXPECT_GT(kept, 100U);
   EXPECT_THAT(told.str(), HasSubstr("with " + std::to_string(kept) + " messages"));
