@@ -169,6 +169,28 @@ TEST(Command, doctor_finds_the_same_faults_in_a_log) {
   EXPECT_THAT(result.output, AllOf(HasSubstr("it is in g"), HasSubstr("carry no time")));
 }
 
+TEST(Command, doctor_shows_what_there_is_where_a_topic_is_missing) {
+  const TemporaryFolder folder;
+  write_bag(folder.path("bag"), {.imu = false});
+  const CommandResult result = trigpoint({"doctor", folder.path("bag")});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.output,
+              AllOf(HasSubstr("points"),
+                    HasSubstr("messages"),
+                    HasSubstr("! imu/data: no message of type sensor_msgs/msg/Imu")));
+}
+
+TEST(Command, info_and_doctor_tell_that_the_recorder_was_killed) {
+  const TemporaryFolder folder;
+  write_bag(folder.path("bag"), {});
+  std::filesystem::remove(folder.path("bag") + "/metadata.yaml");
+  for (const char* verb : {"info", "doctor"}) {
+    const CommandResult result = trigpoint({verb, folder.path("bag")});
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_THAT(result.output, HasSubstr("no metadata.yaml")) << verb;
+  }
+}
+
 TEST(Command, info_tells_topics_and_counts_also_where_one_is_missing) {
   const TemporaryFolder folder;
   write_bag(folder.path("bag"), {.points = false});

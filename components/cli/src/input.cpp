@@ -37,6 +37,12 @@ class WithTruth final : public recording::LogReader {
 
   double progress() const override { return reader_->progress(); }
 
+  std::vector<recording::Undecodable> undecodable() const override {
+    return reader_->undecodable();
+  }
+
+  Events take_events() override { return reader_->take_events(); }
+
   std::optional<std::string> truth_file() const override { return truth_; }
 
   std::optional<RobotConfig> robot() const override { return reader_->robot(); }
@@ -159,8 +165,11 @@ std::optional<fs::path> simulated_drive_of(const fs::path& path) {
   if (!plain.has_filename()) {
     plain = plain.parent_path();  // "log/" as a shell completes it
   }
-  const fs::path folder = plain.filename() == "log" ? plain.parent_path() : plain;
-  return is_simulated_drive(folder) ? std::optional(folder) : std::nullopt;
+  if (is_simulated_drive(plain)) {
+    return plain;
+  }
+  const bool is_its_log = plain.filename() == "log" && is_simulated_drive(plain.parent_path());
+  return is_its_log ? std::optional(plain.parent_path()) : std::nullopt;
 }
 
 Input open_simulated_drive(const InputOptions& options, const fs::path& folder) {

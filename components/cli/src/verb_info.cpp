@@ -19,8 +19,8 @@ int run(const InputOptions& options) {
             << std::setprecision(3) << to_seconds(summary.first_ns) << " s\n  lasts     "
             << duration_s << " s\n  topics\n";
   for (const recording::TopicSummary& topic : summary.topics) {
-    std::cout << "    " << std::left << std::setw(28) << topic.topic << std::setw(34) << topic.type
-              << std::right << std::setw(9) << topic.messages;
+    std::cout << "    " << std::left << std::setw(28) << topic.topic << " " << std::setw(34)
+              << topic.type << " " << std::right << std::setw(9) << topic.messages;
     if (duration_s > 0.0) {
       std::cout << std::setprecision(1) << std::setw(9)
                 << static_cast<double>(topic.messages) / duration_s << " Hz";
@@ -30,7 +30,10 @@ int run(const InputOptions& options) {
   if (const auto truth = input.reader->truth_file()) {
     std::cout << "  truth     " << *truth << "\n";
   }
-  return 0;
+  for (const std::string& fault : summary.faults) {
+    std::cout << "  ! " << fault << "\n";
+  }
+  return summary.faults.empty() ? 0 : 1;
 }
 
 }  // namespace
@@ -41,7 +44,9 @@ void add_info(CLI::App& app, Chosen& chosen) {
   const auto options = std::make_shared<InputOptions>();
   add_input_options(*verb, *options);
   options->lenient = true;
-  verb->footer("trigpoint doctor LOG reads it through and tells what is wrong with it.");
+  verb->footer(
+      "Exit code 0, or 1 when the log is cut off or damaged (see the lines with '!').\n"
+      "trigpoint doctor LOG reads it through and tells what is wrong with it.");
   verb->callback([options, &chosen] { chosen = [options] { return run(*options); }; });
 }
 

@@ -55,7 +55,7 @@ class SessionPart {
     }
     disk_.keep([&] {
       namespace file = exporter::session_file;
-      part_->close();
+      part_->close(reader);
       exporter::write_run(exporter::path_in(folder_, file::kRun),
                           {reader.summary().path,
                            "dds",

@@ -61,6 +61,14 @@ std::string list_text(const std::map<std::string, std::uint64_t>& counts) {
   return text;
 }
 
+/// With what could not be read at all.
+std::string reasons_text(const StreamCounts& counts) {
+  const auto undecodable = counts.get("undecodable").value_or(0);
+  const std::string reasons = list_text(counts.reasons);
+  const std::string skipped = "undecodable " + std::to_string(undecodable);
+  return undecodable == 0 ? reasons : reasons.empty() ? skipped : skipped + ", " + reasons;
+}
+
 std::optional<std::uint64_t> published(const SessionData& data, const std::string& stream) {
   for (const auto& program : data.counts) {
     if (const auto count = counts_of_stream(program, stream).get("published")) {
@@ -113,9 +121,14 @@ void find_losses(const ProgramCounts& program,
   const auto in_log = counts.get("in_log");
   const auto put_out = counts.get("published");
   const auto withheld = counts.get("withheld").value_or(0);
-  if (in_log && put_out && *put_out + withheld != *in_log) {
+  const auto undecodable = counts.get("undecodable").value_or(0);
+  if (in_log && put_out && *put_out + withheld + undecodable != *in_log) {
     findings.losses.push_back(program.program + " published " +
-                              of(*put_out, *in_log - withheld, stream));
+                              of(*put_out, *in_log - withheld - undecodable, stream));
+  }
+  if (in_log && undecodable > 0) {
+    findings.refusals.push_back(program.program + " skipped " + of(undecodable, *in_log, stream) +
+                                " (undecodable: damaged in the log)");
   }
   const auto received = counts.get("received");
   if (received && sent && *received != *sent) {
@@ -255,7 +268,7 @@ std::string print_accounting(const SessionData& data, const Accounting& found) {
                  counts.text("received"),
                  counts.text("used"),
                  std::to_string(counts.refused),
-                 list_text(counts.reasons),
+                 reasons_text(counts),
                  list_text(counts.notes)});
     }
   }

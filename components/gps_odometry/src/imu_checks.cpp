@@ -128,6 +128,11 @@ ImuVerdict ImuChecks::check(const ImuSample& sample) {
                   "IMU sample refused: the same six values came %g times in a row, expected noise.",
                   identical_ + 1);
   }
+  if (const auto& contradiction =
+          gyro_unit_.add(sample.stamp_ns, sample.gyro_radps, sample.accel_mps2)) {
+    fault_ = "imu_gyro_in_degrees";
+    return {std::nullopt, fault_, "IMU refused from here on: " + *contradiction + ".", false};
+  }
   const Vector3d gyro = q_base_imu_ * sample.gyro_radps;
   const Vector3d accel = q_base_imu_ * sample.accel_mps2;
   const double weight = std::max(kMeanWeight, 1.0 / (warm_up_ + 1));

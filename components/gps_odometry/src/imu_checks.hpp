@@ -4,6 +4,7 @@
 // alone: the mean specific force (for levelling) and the gyro's bias at rest.
 #pragma once
 
+#include "trigpoint/base/gyro_unit_check.hpp"
 #include "trigpoint/base/measurements.hpp"
 #include "trigpoint/gps_odometry/config.hpp"
 
@@ -90,6 +91,7 @@ class ImuChecks {
 
   Eigen::Quaterniond q_base_imu_;
   RestBias rest_;
+  GyroUnitCheck gyro_unit_;
   std::optional<Nanoseconds> last_ns_;
   std::optional<Nanoseconds> jump_ns_;  ///< newest of the stamps that do not follow last_ns_
   int jump_count_{0};

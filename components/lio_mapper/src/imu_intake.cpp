@@ -58,6 +58,14 @@ std::optional<InertialSample> ImuIntake::accept(const ImuSample& sample,
     events.push_back(*event);
     return std::nullopt;
   }
+  if (const auto& contradiction =
+          gyro_unit_.add(sample.stamp_ns, sample.gyro_radps, sample.accel_mps2)) {
+    events.push_back({Severity::kError,
+                      sample.stamp_ns,
+                      "imu_gyro_in_degrees",
+                      "refused this IMU from here on: " + *contradiction});
+    return std::nullopt;
+  }
   const double interval_s = to_seconds(sample.stamp_ns - newest_ns_);
   if (accepted_ > 0 && interval_s > max_gap_s) {
     events.push_back({Severity::kWarning,

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "trigpoint/base/event.hpp"
+#include "trigpoint/base/gyro_unit_check.hpp"
 #include "trigpoint/base/measurements.hpp"
 #include "trigpoint/base/messages.hpp"
 
@@ -26,6 +27,7 @@ class Tally {
 };
 
 /// Lets samples in that are finite, possible and newer than the last one, turned into base axes.
+/// Once the gyro is found to speak in degrees a second, none comes in any more.
 class ImuIntake {
  public:
   explicit ImuIntake(const Eigen::Quaterniond& q_base_imu) : q_base_imu_(q_base_imu) {}
@@ -38,6 +40,7 @@ class ImuIntake {
   std::optional<Event> objection(const ImuSample& sample) const;
 
   Eigen::Quaterniond q_base_imu_;
+  GyroUnitCheck gyro_unit_;
   Nanoseconds newest_ns_{0};
   std::uint64_t received_{0};
   std::uint64_t accepted_{0};

@@ -27,12 +27,25 @@ void LogPart::on_entry(const recording::LogEntry& entry) {
   }
 }
 
-void LogPart::close() {
-  counts_.write({{"points.in_log", sweeps_},
+void LogPart::close(const recording::LogReader& log) {
+  const auto undecodable = [&](const std::string& input) {
+    std::uint64_t count = 0;
+    for (const recording::Undecodable& skipped : log.undecodable()) {
+      count += skipped.input == input ? skipped.count : 0;
+    }
+    return count;
+  };
+  const std::uint64_t sweeps_lost = undecodable("points");
+  const std::uint64_t imu_lost = undecodable("imu");
+  const std::uint64_t fixes_lost = undecodable("fix");
+  counts_.write({{"points.in_log", sweeps_ + sweeps_lost},
+                 {"points.undecodable", sweeps_lost},
                  {"points.published", sweeps_},
-                 {"imu.in_log", imu_},
+                 {"imu.in_log", imu_ + imu_lost},
+                 {"imu.undecodable", imu_lost},
                  {"imu.published", imu_},
-                 {"fix.in_log", fixes_fed_ + fixes_withheld_},
+                 {"fix.in_log", fixes_fed_ + fixes_withheld_ + fixes_lost},
+                 {"fix.undecodable", fixes_lost},
                  {"fix.withheld", fixes_withheld_},
                  {"fix.published", fixes_fed_}});
 }

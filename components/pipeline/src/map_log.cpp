@@ -50,13 +50,13 @@ class Session {
     }
   }
 
-  void close(const Lockstep& cores) {
+  void close(const Lockstep& cores, const recording::LogReader& log) {
     keep_datum(cores);
     keep_alignment(cores);
     gps_.close(cores.gps_status());
     mapper_.close(cores.lio_status());
     gate_.close();
-    log_.close();
+    log_.close(log);
   }
 
   void keep_truth(const recording::LogReader& log) const { log_.keep_truth(log); }
@@ -99,9 +99,9 @@ std::optional<recording::LogEntry> next_entry(recording::LogReader& log, std::st
   }
 }
 
-void tell(const Step& step, const MapLogOptions& options) {
+void tell(const Events& events, const MapLogOptions& options) {
   if (options.on_event) {
-    for (const Event& event : step.events) {
+    for (const Event& event : events) {
       options.on_event(event);
     }
   }
@@ -135,9 +135,11 @@ MapLogResult map_log(recording::LogReader& log,
     const Clock::time_point before = Clock::now();
     Step step = advance();
     session.on_step(step, cores, milliseconds_since(before));
-    tell(step, options);
+    tell(step.events, options);
   };
+  tell(recording::fault_events(log.summary()), options);
   while (const auto entry = next_entry(log, result.log_error)) {
+    tell(log.take_events(), options);
     session.on_entry(*entry);
     run([&] { return cores.step(*entry); });
     if (options.progress) {
@@ -149,7 +151,9 @@ MapLogResult map_log(recording::LogReader& log,
     }
   }
   run([&] { return cores.finish(); });
-  session.close(cores);
+  tell(log.take_events(), options);
+  tell(recording::undecodable_events(log), options);
+  session.close(cores, log);
 
   result.sweeps_in_log = session.log().sweeps();
   result.sweeps_used = cores.lio_status().scans_used;

@@ -20,7 +20,9 @@ namespace {
 class Listener {
  public:
   Listener(bus::Participant& participant, bus::Loop& loop, const KnownTopic& topic)
-      : subscription_(participant,
+      : checks_(topic.from_sensor ? MeasurementChecks::Origin::kSensor
+                                  : MeasurementChecks::Origin::kOurs),
+        subscription_(participant,
                       topic.name,
                       topic.ros_type,
                       topic.qos,

@@ -14,7 +14,12 @@ template <typename T>
 KnownTopic known(const bus::Topic<T>& topic,
                  const std::string& ros_type,
                  const std::string& name = {}) {
-  return {name.empty() ? std::string(topic.name) : name, ros_type, topic.qos};
+  return {name.empty() ? std::string(topic.name) : name, ros_type, topic.qos, false};
+}
+
+KnownTopic input(KnownTopic topic) {
+  topic.from_sensor = true;
+  return topic;
 }
 
 }  // namespace
@@ -24,9 +29,9 @@ std::vector<KnownTopic> known_topics(const RobotConfig& robot) {
   const std::string cloud = "sensor_msgs/msg/PointCloud2";
   const std::string fix = "sensor_msgs/msg/NavSatFix";
   const std::string tf = "tf2_msgs/msg/TFMessage";
-  return {known(topics::points, cloud, robot.points_topic),
-          known(topics::imu, "sensor_msgs/msg/Imu", robot.imu_topic),
-          known(topics::fix, fix, robot.fix_topic),
+  return {input(known(topics::points, cloud, robot.points_topic)),
+          input(known(topics::imu, "sensor_msgs/msg/Imu", robot.imu_topic)),
+          input(known(topics::fix, fix, robot.fix_topic)),
           known(topics::clock, "rosgraph_msgs/msg/Clock"),
           known(topics::gps_odometry, odometry),
           known(topics::gps_status, "trigpoint_msgs/msg/GpsStatus"),

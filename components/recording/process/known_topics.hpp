@@ -15,6 +15,7 @@ struct KnownTopic {
   std::string name;      ///< without a leading slash
   std::string ros_type;  ///< e.g. "sensor_msgs/msg/Imu"
   bus::Qos qos;
+  bool from_sensor{false};  ///< one of the three inputs
 };
 
 /// The three sensor topics under the names that `robot` gives them, and all others.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 
 namespace trigpoint::recording {
@@ -31,6 +32,10 @@ bool has_field(const PointCloudMessage& cloud, const std::vector<std::string>& n
 
 void MeasurementChecks::take(const ImuSample& sample) {
   check_stamp(sample.stamp_ns, sample.frame_id);
+  if (!sample.accel_mps2.allFinite() || !sample.gyro_radps.allFinite()) {
+    note("a value that is not finite (NaN or infinite): the sample is of no use");
+    return;
+  }
   ++imu_samples_;
   accel_sum_mps2_ += sample.accel_mps2.norm();
   accel_z_sum_mps2_ += sample.accel_mps2.z();
@@ -45,7 +50,19 @@ void MeasurementChecks::take(const GnssFix& fix) {
   if (fix.latitude_deg == 0.0 && fix.longitude_deg == 0.0) {
     note("latitude and longitude are exactly 0: the receiver has no position");
   }
-  if (fix.covariance_type == CovarianceType::kUnknown || fix.covariance_enu_m2.trace() <= 0.0) {
+  if (!std::isfinite(fix.latitude_deg) || !std::isfinite(fix.longitude_deg) ||
+      !std::isfinite(fix.altitude_m)) {
+    note("a position that is not finite (NaN or infinite): the fix is of no use");
+  } else if (std::abs(fix.latitude_deg) > 90.0 || std::abs(fix.longitude_deg) > 180.0) {
+    note("latitude or longitude out of range (90 and 180 degrees)");
+  }
+  if (origin_ == Origin::kOurs) {
+    return;
+  }
+  if (!fix.covariance_enu_m2.allFinite()) {
+    note("a covariance that is not finite (NaN or infinite)");
+  } else if (fix.covariance_type == CovarianceType::kUnknown ||
+             fix.covariance_enu_m2.trace() <= 0.0) {
     note("the fix says nothing of its covariance: a class default is assumed");
   }
 }
@@ -56,7 +73,8 @@ void MeasurementChecks::take(const PointCloudMessage& cloud) {
     note("an empty cloud");
   } else if (!has_field(cloud, {"x"}) || !has_field(cloud, {"y"}) || !has_field(cloud, {"z"})) {
     note("the cloud lacks a field x, y or z");
-  } else if (!has_field(cloud, {"time", "t", "timestamp", "time_stamp", "offset_time"})) {
+  } else if (origin_ == Origin::kSensor &&
+             !has_field(cloud, {"time", "t", "timestamp", "time_stamp", "offset_time"})) {
     note(
         "the points carry no time (no field time, t or timestamp): set lio_mapper.sweep.point_time "
         "to azimuth or snapshot");
@@ -96,7 +114,7 @@ std::vector<std::string> MeasurementChecks::remarks() const {
 }
 
 void MeasurementChecks::check_stamp(Nanoseconds stamp_ns, const std::string& frame_id) {
-  if (stamp_ns <= 0) {
+  if (stamp_ns <= 0 && origin_ == Origin::kSensor) {
     note("a stamp of 0");
   } else if (stamp_ns < newest_ns_) {
     note("a stamp that goes back");

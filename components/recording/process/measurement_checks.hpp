@@ -15,6 +15,12 @@ namespace trigpoint::recording {
 /// units, frames, missing fields, stamps that go back.
 class MeasurementChecks {
  public:
+  /// What Trigpoint itself publishes (datum, registered clouds, the map) has no receiver's
+  /// covariance, no time per point, and for what is not of a moment a stamp of 0.
+  enum class Origin { kSensor, kOurs };
+
+  explicit MeasurementChecks(Origin origin = Origin::kSensor) : origin_(origin) {}
+
   void take(const ImuSample& sample);
   void take(const GnssFix& fix);
   void take(const PointCloudMessage& cloud);
@@ -26,6 +32,7 @@ class MeasurementChecks {
  private:
   void check_stamp(Nanoseconds stamp_ns, const std::string& frame_id);
 
+  Origin origin_;
   std::map<std::string, std::uint64_t> notes_;
   Nanoseconds newest_ns_{0};
   std::uint64_t imu_samples_{0};

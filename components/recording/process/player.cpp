@@ -106,6 +106,14 @@ class Player {
     });
   }
 
+  void tell(const Events& events) const {
+    for (const Event& event : events) {
+      if (options_.on_event) {
+        options_.on_event(event);
+      }
+    }
+  }
+
   bool stop_requested() const { return options_.stop && options_.stop(); }
 
   PlayResult result;
@@ -215,10 +223,12 @@ class Player {
 
 PlayResult play(LogReader& log, const PlayOptions& options) {
   Player player(options);
+  player.tell(fault_events(log.summary()));
   player.wait_for_peers();
   try {
     while (!player.stop_requested()) {
       const std::optional<LogEntry> entry = log.next();
+      player.tell(log.take_events());
       if (!entry) {
         break;
       }
@@ -233,6 +243,7 @@ PlayResult play(LogReader& log, const PlayOptions& options) {
   } catch (const LogError& broken) {
     player.result.log_error = broken.what();
   }
+  player.tell(undecodable_events(log));
   player.result.stopped = player.stop_requested();
   if (!player.result.stopped) {
     player.drain();

@@ -2,8 +2,11 @@
 // Copyright the Trigpoint developers
 #include "bag_source.hpp"
 
+#include "skipped_messages.hpp"
+
 #include <algorithm>
 #include <filesystem>
+#include <map>
 
 namespace trigpoint::recording {
 
@@ -19,22 +22,14 @@ class BagReader : public LogReader {
   const LogSummary& summary() const override { return source_->summary(); }
 
   std::optional<LogEntry> next() override {
-    const auto raw = source_->next();
-    if (!raw) {
-      now_ns_ = summary().last_ns;
-      return std::nullopt;
+    while (const auto raw = source_->next()) {
+      now_ns_ = raw->receive_ns;
+      if (auto entry = entry_of(*raw)) {
+        return entry;
+      }
     }
-    now_ns_ = raw->receive_ns;
-    LogEntry entry;
-    entry.receive_ns = raw->receive_ns;
-    if (raw->topic == topics_.points) {
-      entry.measurement = decoded<PointCloudMessage>(*raw);
-    } else if (raw->topic == topics_.imu) {
-      entry.measurement = decoded<ImuSample>(*raw);
-    } else {
-      entry.measurement = decoded<GnssFix>(*raw);
-    }
-    return entry;
+    now_ns_ = summary().last_ns;
+    return std::nullopt;
   }
 
   double progress() const override {
@@ -42,6 +37,10 @@ class BagReader : public LogReader {
     return span_s > 0.0 ? std::clamp(to_seconds(now_ns_ - summary().first_ns) / span_s, 0.0, 1.0)
                         : 0.0;
   }
+
+  std::vector<Undecodable> undecodable() const override { return skipped_.counts(); }
+
+  Events take_events() override { return skipped_.take_events(); }
 
   /// `trigpoint simulate --out DIR` writes DIR/log and DIR/truth.tum.
   std::optional<std::string> truth_file() const override {
@@ -55,19 +54,36 @@ class BagReader : public LogReader {
   }
 
  private:
-  template <class Message>
-  Message decoded(const RawMessage& raw) const {
-    Message message;
-    if (!source_->decode(raw, message)) {
-      throw LogError(summary().path + ": a message of " + std::to_string(raw.bytes.size()) +
-                     " bytes on '" + raw.topic + "' received at " +
-                     std::to_string(to_seconds(raw.receive_ns)) + " s is damaged");
+  std::optional<LogEntry> entry_of(const RawMessage& raw) {
+    if (raw.topic == topics_.points) {
+      return decoded<PointCloudMessage>(raw, "points", "sensor_msgs/msg/PointCloud2");
     }
-    return message;
+    if (raw.topic == topics_.imu) {
+      return decoded<ImuSample>(raw, "imu", "sensor_msgs/msg/Imu");
+    }
+    return decoded<GnssFix>(raw, "fix", "sensor_msgs/msg/NavSatFix");
+  }
+
+  /// nullopt for a message that is damaged; it is counted, and the log goes on.
+  template <class Message>
+  std::optional<LogEntry> decoded(const RawMessage& raw, const char* input, const char* type) {
+    const std::uint64_t number = ++numbers_[raw.topic];
+    Message message;
+    if (source_->decode(raw, message)) {
+      return LogEntry{raw.receive_ns, std::move(message)};
+    }
+    skipped_.add({input, raw.topic, std::string("not a ") + type},
+                 number,
+                 raw.receive_ns,
+                 "its " + std::to_string(raw.bytes.size()) + " bytes, received at " +
+                     std::to_string(to_seconds(raw.receive_ns)) + " s, are not a " + type);
+    return std::nullopt;
   }
 
   std::unique_ptr<BagSource> source_;
   TopicChoice topics_;
+  SkippedMessages skipped_;
+  std::map<std::string, std::uint64_t> numbers_;  ///< messages so far, by topic
   Nanoseconds now_ns_{0};
 };
 

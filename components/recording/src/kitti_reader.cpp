@@ -3,13 +3,17 @@
 #include "kitti_reader.hpp"
 
 #include "kitti_drive.hpp"
+#include "skipped_messages.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cstdio>
 
 namespace trigpoint::recording {
 
 namespace {
 
+constexpr char kSweepTopic[] = "velodyne_points";
 constexpr Nanoseconds kAfterLastSweep_ns = 200'000'000;
 
 /// Where an entry's measurement is to be found; sweeps are read from disk when their turn comes.
@@ -22,34 +26,23 @@ struct Arrival {
 
 class KittiReader : public LogReader {
  public:
-  KittiReader(KittiDrive drive, const LogOptions& options)
+  KittiReader(KittiDrive drive, const RobotConfig& robot, const LogOptions& options)
       : drive_(std::move(drive)), elevation_correction_rad_(options.elevation_correction_rad) {
     list_arrivals(options);
     summarize();
+    note_missing_calibration(robot);
   }
 
   const LogSummary& summary() const override { return summary_; }
 
   std::optional<LogEntry> next() override {
-    if (next_ == arrivals_.size()) {
-      return std::nullopt;
+    while (next_ < arrivals_.size()) {
+      const Arrival& arrival = arrivals_[next_++];
+      if (auto measurement = measured(arrival)) {
+        return LogEntry{arrival.receive_ns, std::move(*measurement)};
+      }
     }
-    const Arrival& arrival = arrivals_[next_++];
-    LogEntry entry;
-    entry.receive_ns = arrival.receive_ns;
-    switch (arrival.kind) {
-      case Arrival::Kind::kImu:
-        entry.measurement = drive_.imu[arrival.index];
-        break;
-      case Arrival::Kind::kFix:
-        entry.measurement = drive_.fixes[arrival.index];
-        break;
-      case Arrival::Kind::kSweep:
-        entry.measurement =
-            load_kitti_sweep(drive_.sweeps[arrival.index], elevation_correction_rad_);
-        break;
-    }
-    return entry;
+    return std::nullopt;
   }
 
   double progress() const override {
@@ -57,10 +50,34 @@ class KittiReader : public LogReader {
                              : static_cast<double>(next_) / static_cast<double>(arrivals_.size());
   }
 
+  std::vector<Undecodable> undecodable() const override { return skipped_.counts(); }
+
+  Events take_events() override { return skipped_.take_events(); }
+
   std::optional<RobotConfig> robot() const override { return drive_.robot; }
 
  private:
   using Kind = Arrival::Kind;
+
+  std::optional<Measurement> measured(const Arrival& arrival) {
+    switch (arrival.kind) {
+      case Kind::kImu:
+        return drive_.imu[arrival.index];
+      case Kind::kFix:
+        return drive_.fixes[arrival.index];
+      case Kind::kSweep:
+        break;
+    }
+    try {
+      return load_kitti_sweep(drive_.sweeps[arrival.index], elevation_correction_rad_);
+    } catch (const LogError& error) {
+      skipped_.add({"points", kSweepTopic, "its file is damaged"},
+                   arrival.index + 1,
+                   arrival.receive_ns,
+                   error.what());
+      return std::nullopt;
+    }
+  }
 
   void list_arrivals(const LogOptions& options) {
     add(Kind::kImu, drive_.imu);
@@ -103,7 +120,7 @@ class KittiReader : public LogReader {
   void summarize() {
     summary_.path = drive_.sync_folder.string();
     summary_.format = "kitti";
-    summary_.topics = {{"velodyne_points", "sensor_msgs/msg/PointCloud2", count(Kind::kSweep)},
+    summary_.topics = {{kSweepTopic, "sensor_msgs/msg/PointCloud2", count(Kind::kSweep)},
                        {drive_.imu_source, "sensor_msgs/msg/Imu", count(Kind::kImu)},
                        {"oxts position", "sensor_msgs/msg/NavSatFix", count(Kind::kFix)}};
     if (!arrivals_.empty()) {
@@ -112,10 +129,34 @@ class KittiReader : public LogReader {
     }
   }
 
+  void note_missing_calibration(const RobotConfig& robot) {
+    if (drive_.robot) {
+      return;
+    }
+    const Eigen::Vector3d& p = robot.lidar_position_base_m;
+    const Eigen::Vector3d& turn = robot.lidar_roll_pitch_yaw_base_rad;
+    std::array<char, 200> assumed{};
+    std::snprintf(assumed.data(),
+                  assumed.size(),
+                  "[%g, %g, %g] m, turned by [%g, %g, %g] rad",
+                  p.x(),
+                  p.y(),
+                  p.z(),
+                  turn.x(),
+                  turn.y(),
+                  turn.z());
+    summary_.faults.push_back(
+        drive_.sync_folder.string() +
+        ": calib_imu_to_velo.txt is missing (neither here nor beside it): where the LiDAR sits is "
+        "not known. Assumed from the configuration: robot.lidar_position_base_m " +
+        assumed.data() + " against the IMU");
+  }
+
   KittiDrive drive_;
   double elevation_correction_rad_;
   LogSummary summary_;
   std::vector<Arrival> arrivals_;
+  SkippedMessages skipped_;
   std::size_t next_{0};
 };
 
@@ -128,6 +169,7 @@ void require(bool needed, bool there, const std::filesystem::path& folder, const
 }  // namespace
 
 std::unique_ptr<LogReader> open_kitti_drive(const std::filesystem::path& sync_folder,
+                                            const RobotConfig& robot,
                                             const LogOptions& options) {
   KittiDrive drive = load_kitti_drive(sync_folder);
   require(options.require_points,
@@ -137,7 +179,7 @@ std::unique_ptr<LogReader> open_kitti_drive(const std::filesystem::path& sync_fo
   require(
       options.require_imu, !drive.imu.empty(), sync_folder, "IMU (imu100.csv or oxts/data/*.txt)");
   require(options.require_fix, !drive.fixes.empty(), sync_folder, "fixes (oxts/data/*.txt)");
-  return std::make_unique<KittiReader>(std::move(drive), options);
+  return std::make_unique<KittiReader>(std::move(drive), robot, options);
 }
 
 }  // namespace trigpoint::recording

@@ -15,6 +15,7 @@ namespace trigpoint::recording {
 /// order and stamps, also where the recording's stamps step back; they arrive when the newest
 /// stamp so far says, so that the order of arrival never runs backwards.
 std::unique_ptr<LogReader> open_kitti_drive(const std::filesystem::path& sync_folder,
+                                            const RobotConfig& robot,
                                             const LogOptions& options);
 
 }  // namespace trigpoint::recording

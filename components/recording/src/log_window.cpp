@@ -71,6 +71,10 @@ class LogWindow : public LogReader {
                                    : (now_ns_ ? 1.0 : 0.0);
   }
 
+  std::vector<Undecodable> undecodable() const override { return log_->undecodable(); }
+
+  Events take_events() override { return log_->take_events(); }
+
   std::optional<std::string> truth_file() const override { return log_->truth_file(); }
 
   std::optional<RobotConfig> robot() const override { return log_->robot(); }

@@ -10,6 +10,8 @@
 #include "rosbag2_source.hpp"
 
 #include <filesystem>
+#include <fstream>
+#include <string_view>
 
 namespace trigpoint::recording {
 
@@ -17,21 +19,42 @@ namespace fs = std::filesystem;
 
 namespace {
 
+/// By its first line, or by its name when it is cut off in there.
+bool is_rosbag1(const fs::path& path) {
+  constexpr std::string_view kMagic = "#ROSBAG V";
+  std::string begin(kMagic.size(), ' ');
+  std::ifstream(path, std::ios::binary)
+      .read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  return begin == kMagic || path.filename().string().find(".bag") != std::string::npos;
+}
+
+/// A hint for files that lie near a log.
+std::string hint_for(const fs::path& path) {
+  if (path.filename() == "metadata.yaml") {
+    return "; it describes a rosbag2: name the folder that it lies in";
+  }
+  return fs::is_directory(path) ? "; the folder holds none of these" : "";
+}
+
 std::unique_ptr<LogReader> open_by_kind(const fs::path& path,
                                         const RobotConfig& robot,
                                         const LogOptions& options) {
-  if (fs::is_regular_file(path) && path.filename().string().find(".bag") != std::string::npos) {
+  if (fs::is_regular_file(path) && is_rosbag1(path)) {
     return read_bag(open_rosbag1(path), robot, options);
   }
-  if (const auto files = find_rosbag2_files(path); !files.empty()) {
-    return read_bag(open_rosbag2(path, files), robot, options);
+  if (fs::is_directory(path) || path.extension() == ".db3") {
+    if (const auto files = find_rosbag2_files(path); !files.empty()) {
+      return read_bag(open_rosbag2(path, files), robot, options);
+    }
   }
   if (const auto sync_folder = find_kitti_sync_folder(path)) {
-    return open_kitti_drive(*sync_folder, options);
+    return open_kitti_drive(*sync_folder, robot, options);
   }
   throw LogError(path.string() +
                  ": is no log that is known here; expected a ROS 1 bag (.bag), a rosbag2 folder "
-                 "(metadata.yaml, .db3), or a KITTI raw drive (velodyne_points, oxts)");
+                 "(metadata.yaml, .db3) or a .db3 of one, a KITTI raw drive (velodyne_points, "
+                 "oxts), a folder made by trigpoint simulate, or a scenario" +
+                 hint_for(path));
 }
 
 }  // namespace

@@ -136,6 +136,11 @@ class SalvagedBag : public BagSource {
     summary_.format = "rosbag1";
     char line[sizeof(kVersionLine) - 1] = {};
     stream_.read(line, sizeof(line));
+    if (stream_.gcount() < static_cast<std::streamsize>(sizeof(line)) &&
+        std::memcmp(line, kVersionLine, static_cast<std::size_t>(stream_.gcount())) == 0) {
+      throw LogError(file.string() + ": the bag is cut off in its first line, after " +
+                     std::to_string(stream_.gcount()) + " bytes; nothing can be read from it");
+    }
     if (std::memcmp(line, kVersionLine, sizeof(line)) != 0) {
       throw LogError(file.string() +
                      ": is no ROS 1 bag of format 2.0 (its first line is not '#ROSBAG V2.0')");
@@ -143,6 +148,14 @@ class SalvagedBag : public BagSource {
     size_ = fs::file_size(file);
     scan();
     summarize();
+    break_ = file.string() + ": the bag breaks off after " + std::to_string(end_) + " of " +
+             std::to_string(size_) +
+             " bytes (no index: its recorder was killed, or the file is cut off)";
+    if (chunks_.empty()) {
+      throw LogError(file.string() + ": the bag is cut off in its header or its first chunk: of " +
+                     std::to_string(size_) + " bytes, none belongs to a whole message");
+    }
+    summary_.faults.push_back(break_);
   }
 
   const LogSummary& summary() const override { return summary_; }
@@ -157,10 +170,7 @@ class SalvagedBag : public BagSource {
 
   std::optional<RawMessage> next() override {
     if (next_ == places_.size()) {
-      throw LogError(summary_.path + ": the bag breaks off after " + std::to_string(end_) + " of " +
-                     std::to_string(size_) +
-                     " bytes (no index: its recorder was killed, or the file is cut off); what "
-                     "came before was read");
+      throw LogError(break_ + "; what came before was read");
     }
     const Place& place = places_[next_++];
     if (place.chunk != loaded_) {
@@ -294,6 +304,7 @@ class SalvagedBag : public BagSource {
   std::ifstream stream_;
   std::uint64_t size_{0};
   std::uint64_t end_{0};
+  std::string break_;
   LogSummary summary_;
   std::vector<Chunk> chunks_;
   std::map<std::uint32_t, std::string> connections_;

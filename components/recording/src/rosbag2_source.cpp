@@ -6,10 +6,12 @@
 
 #include "rosbag2_metadata.hpp"
 #include "sqlite.hpp"
+#include "sqlite_salvage.hpp"
 
 #include <algorithm>
 #include <map>
 #include <set>
+#include <utility>
 
 namespace trigpoint::recording {
 
@@ -60,19 +62,24 @@ Database open_database(const std::string& file, bool repair) {
   }
 }
 
-/// One .db3; messages in order of time, or of recording when the file is damaged.
+/// One .db3; messages in order of time. Where SQLite can't go on in a damaged file, its leaves are
+/// looked for one by one, and at the end the damage is an error.
 class Db3 {
  public:
   explicit Db3(const fs::path& file) : file_(file.string()) {
-    check_header(file);
+    if (fs::file_size(file) == 0) {
+      throw LogError(file.string() + ": the file is empty");
+    }
     try {
-      open(false);
-    } catch (const LogError&) {
-      open(true);
+      read_topics(false);
+      count();
+    } catch (const LogError& error) {
+      damage_ = error.what();
+      salvage_topics();
+      begin_salvage();
+      count_salvaged();
     }
   }
-
-  bool damaged() const { return damaged_; }
 
   const std::map<std::int64_t, TopicSummary>& topics() const { return topics_; }
 
@@ -80,44 +87,54 @@ class Db3 {
 
   Nanoseconds last_ns() const { return last_ns_; }
 
+  /// Empty when nothing is known to be wrong.
+  std::string fault() const {
+    if (!damage_.empty()) {
+      return damage_ + "; the file is cut off or damaged, " + std::to_string(counted()) +
+             " messages can be read";
+    }
+    std::error_code none;
+    const auto log_bytes = fs::file_size(file_ + "-wal", none);
+    return none || log_bytes == 0
+               ? ""
+               : file_ + ": has a write-ahead log of " + std::to_string(log_bytes) +
+                     " bytes beside it: its recorder was killed or still writes";
+  }
+
   void select(const std::set<std::string>& names) {
     std::string ids = "-1";
     for (const auto& [id, topic] : topics_) {
-      ids += names.count(topic.topic) > 0 ? "," + std::to_string(id) : "";
+      if (names.count(topic.topic) > 0) {
+        ids += "," + std::to_string(id);
+        selected_.insert(id);
+      }
     }
-    messages_.emplace(
-        database_->prepare("SELECT timestamp, topic_id, data FROM messages WHERE topic_id IN (" +
-                           ids + ") ORDER BY " + (damaged_ ? "id" : "timestamp, id")));
+    if (!salvage_) {
+      messages_.emplace(database_->prepare(
+          "SELECT timestamp, topic_id, data, id FROM messages WHERE topic_id IN (" + ids +
+          ") ORDER BY timestamp, id"));
+    }
   }
 
   std::optional<RawMessage> next() {
-    try {
-      if (messages_->step()) {
-        const auto blob = messages_->blob(2);
-        return RawMessage{messages_->integer(0),
-                          topics_.at(messages_->integer(1)).topic,
-                          {blob.begin(), blob.end()}};
+    if (!salvage_) {
+      try {
+        return next_row();
+      } catch (const LogError& error) {
+        damage_ = error.what();
+        begin_salvage();
       }
-    } catch (const LogError& error) {
-      throw LogError(std::string(error.what()) +
-                     "; the log breaks off here, what came before was read");
     }
-    if (damaged_) {
-      throw LogError(file_ +
-                     ": the log breaks off here, the file is damaged; what came before was read");
+    if (auto raw = next_salvaged()) {
+      return raw;
     }
-    return std::nullopt;
+    throw LogError(damage_ + "; the log breaks off, the file is cut off or damaged; the " +
+                   std::to_string(salvage_->rows().size()) +
+                   " messages that are whole in it were read");
   }
 
  private:
-  static void check_header(const fs::path& file) {
-    if (fs::file_size(file) == 0) {
-      throw LogError(file.string() + ": the file is empty");
-    }
-  }
-
-  void open(bool repair) {
-    damaged_ = repair;
+  void read_topics(bool repair) {
     topics_.clear();
     database_.emplace(open_database(file_, repair));
     auto rows = database_->prepare("SELECT id, name, type, serialization_format FROM topics");
@@ -128,36 +145,86 @@ class Db3 {
       }
       topics_[rows.integer(0)] = {rows.text(1), ros2_type_name(rows.text(2)), 0};
     }
+  }
+
+  void salvage_topics() {
     try {
-      count();
+      read_topics(true);
     } catch (const LogError&) {
-      if (!repair) {
-        throw;
-      }
+      throw LogError(damage_ +
+                     "; the file is damaged at its beginning or no rosbag2: not even its topics "
+                     "can be read");
     }
   }
 
-  /// Walks over the messages without their data. In a damaged file it stops where that breaks.
+  /// Walks over the messages without their data.
   void count() {
     auto rows =
         database_->prepare("SELECT topic_id, timestamp FROM messages NOT INDEXED ORDER BY id");
     while (rows.step()) {
-      const auto topic = topics_.find(rows.integer(0));
-      if (topic == topics_.end()) {
-        continue;  // where a file is cut off SQLite may hand out a row of zeros
-      }
-      const Nanoseconds time_ns = rows.integer(1);
-      first_ns_ = first_ns_ == 0 ? time_ns : std::min(first_ns_, time_ns);
-      last_ns_ = std::max(last_ns_, time_ns);
-      ++topic->second.messages;
+      count(rows.integer(0), rows.integer(1));
     }
   }
 
+  void count(std::int64_t topic_id, Nanoseconds time_ns) {
+    const auto topic = topics_.find(topic_id);
+    if (topic == topics_.end()) {
+      return;
+    }
+    first_ns_ = first_ns_ == 0 ? time_ns : std::min(first_ns_, time_ns);
+    last_ns_ = std::max(last_ns_, time_ns);
+    ++topic->second.messages;
+  }
+
+  void count_salvaged() {
+    first_ns_ = last_ns_ = 0;
+    for (const SalvagedRow& row : salvage_->rows()) {
+      count(row.topic_id, row.timestamp_ns);
+    }
+  }
+
+  std::uint64_t counted() const {
+    std::uint64_t sum = 0;
+    for (const auto& [id, topic] : topics_) {
+      sum += topic.messages;
+    }
+    return sum;
+  }
+
+  std::optional<RawMessage> next_row() {
+    if (!messages_->step()) {
+      return std::nullopt;
+    }
+    at_ = {messages_->integer(0), messages_->integer(3)};
+    const auto blob = messages_->blob(2);
+    return RawMessage{
+        at_.first, topics_.at(messages_->integer(1)).topic, {blob.begin(), blob.end()}};
+  }
+
+  void begin_salvage() { salvage_ = std::make_unique<SqliteSalvage>(file_); }
+
+  std::optional<RawMessage> next_salvaged() {
+    while (next_salvaged_ < salvage_->rows().size()) {
+      const SalvagedRow& row = salvage_->rows()[next_salvaged_++];
+      if (selected_.count(row.topic_id) == 0 || std::pair(row.timestamp_ns, row.id) <= at_) {
+        continue;
+      }
+      if (auto bytes = salvage_->data(row)) {
+        return RawMessage{row.timestamp_ns, topics_.at(row.topic_id).topic, std::move(*bytes)};
+      }
+    }
+    return std::nullopt;
+  }
+
   std::string file_;
-  bool damaged_{false};
+  std::string damage_;  ///< SQLite's own words
   std::optional<Database> database_;
   std::optional<Statement> messages_;
   std::map<std::int64_t, TopicSummary> topics_;
+  std::set<std::int64_t> selected_;
+  std::pair<std::int64_t, std::int64_t> at_{0, 0};  ///< time and id of the newest row from SQLite
+  std::unique_ptr<SqliteSalvage> salvage_;          ///< in its place from where it failed
+  std::size_t next_salvaged_{0};
   Nanoseconds first_ns_{0};
   Nanoseconds last_ns_{0};
 };
@@ -181,9 +248,17 @@ class Rosbag2Source : public BagSource {
 
   std::optional<RawMessage> next() override {
     for (; at_ < files_.size(); ++at_) {
-      if (auto raw = files_[at_]->next()) {
-        return raw;
+      try {
+        if (auto raw = files_[at_]->next()) {
+          return raw;
+        }
+      } catch (const LogError& error) {
+        // The bag's other files may be whole.
+        damage_ += (damage_.empty() ? "" : "\n") + std::string(error.what());
       }
+    }
+    if (!damage_.empty()) {
+      throw LogError(damage_);
     }
     return std::nullopt;
   }
@@ -219,11 +294,26 @@ class Rosbag2Source : public BagSource {
     for (const auto& [name, topic] : topics) {
       summary_.topics.push_back(topic);
     }
+    note_faults(path);
+  }
+
+  void note_faults(const fs::path& path) {
+    if (fs::is_directory(path) && !fs::is_regular_file(path / "metadata.yaml")) {
+      summary_.faults.push_back(path.string() +
+                                ": has no metadata.yaml: its recorder was killed or still writes; "
+                                "its last second may be missing");
+    }
+    for (const auto& file : files_) {
+      if (auto fault = file->fault(); !fault.empty()) {
+        summary_.faults.push_back(std::move(fault));
+      }
+    }
   }
 
   // Statements refer to their database: neither may move.
   std::vector<std::unique_ptr<Db3>> files_;
   std::size_t at_{0};
+  std::string damage_;
   LogSummary summary_;
 };
 

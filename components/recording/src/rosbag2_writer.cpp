@@ -6,9 +6,13 @@
 
 #include "rosbag2_metadata.hpp"
 #include "sqlite.hpp"
+#include <fcntl.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -34,6 +38,52 @@ constexpr char kSchema[] =
     "INSERT INTO schema(schema_version, ros_distro) VALUES (3, 'humble');";
 
 constexpr auto kTransaction = std::chrono::seconds(1);
+/// A transaction waits in the write-ahead log, which is emptied into the database after each: a log
+/// that grew with the drive could not be emptied any more on a full disk.
+constexpr std::uint64_t kTransaction_bytes = 4U << 20U;
+/// Kept free for emptying the write-ahead log once more when the disk is full: what it may hold,
+/// and as much again for pages of the index, metadata.yaml and SQLite's shared memory.
+constexpr std::uint64_t kReserveOverTransaction = 2;
+
+/// Room on the disk that belongs to nobody else until it is given back: a file without a name,
+/// which also vanishes with a killed process.
+class DiskReserve {
+ public:
+  explicit DiskReserve(const fs::path& folder) : name_((folder / "reserve").string()) {}
+
+  ~DiskReserve() { release(); }
+
+  DiskReserve(const DiskReserve&) = delete;
+  DiskReserve& operator=(const DiskReserve&) = delete;
+
+  /// Throws LogError when the disk has not so much left.
+  void hold(std::uint64_t bytes) {
+    if (bytes <= bytes_) {
+      return;
+    }
+    if (file_ < 0) {
+      file_ = ::open(name_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+      ::unlink(name_.c_str());
+    }
+    const int error = file_ < 0 ? errno : ::posix_fallocate(file_, 0, static_cast<off_t>(bytes));
+    if (error == ENOSPC || error == EDQUOT || error == EFBIG) {
+      throw LogError(name_ + ": " + std::to_string(bytes) +
+                     " bytes can't be kept free for the end: " + std::strerror(error));
+    }
+    bytes_ = bytes;  // where a file system refuses for another reason there is no reserve
+  }
+
+  void release() {
+    if (file_ >= 0) {
+      ::close(std::exchange(file_, -1));
+    }
+  }
+
+ private:
+  std::string name_;
+  int file_{-1};
+  std::uint64_t bytes_{0};
+};
 
 fs::path new_folder(const fs::path& folder) {
   std::error_code error;
@@ -63,6 +113,7 @@ class Rosbag2Writer::Bag {
  public:
   Bag(const std::string& folder, std::uint64_t largest_bytes)
       : folder_(new_folder(folder)),
+        reserve_(folder_),
         database_(std::in_place,
                   (folder_ / file_name(folder_)).string(),
                   SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE) {
@@ -87,20 +138,27 @@ class Rosbag2Writer::Bag {
              Nanoseconds receive_ns,
              std::span<const std::uint8_t> cdr) {
     guarded([&] {
+      reserve_.hold(kReserveOverTransaction * (kTransaction_bytes + cdr.size()));
       begin();
       const auto id = topic_id(topic, type, Durability::kVolatile);
       insert_->bind(1, id).bind(2, receive_ns).bind(3, cdr).step();
       insert_->reset();
       ++unflushed_[id];
       note_time(receive_ns);
-      if (std::chrono::steady_clock::now() - begun_ >= kTransaction) {
+      begun_bytes_ += cdr.size();
+      if (begun_bytes_ >= kTransaction_bytes ||
+          std::chrono::steady_clock::now() - begun_ >= kTransaction) {
         commit();
+        empty_write_ahead_log();
       }
     });
   }
 
   void flush() {
-    guarded([&] { commit(); });
+    guarded([&] {
+      commit();
+      empty_write_ahead_log();
+    });
   }
 
   void close() {
@@ -109,6 +167,8 @@ class Rosbag2Writer::Bag {
     }
     guarded([&] {
       commit();
+      empty_write_ahead_log();
+      reserve_.release();
       insert_.reset();
       const Rosbag2Metadata metadata = describe();
       database_->prepare("INSERT INTO metadata(metadata_version, metadata) VALUES (5, ?)")
@@ -141,8 +201,12 @@ class Rosbag2Writer::Bag {
     if (!database_->in_transaction()) {
       database_->run("BEGIN");
       begun_ = std::chrono::steady_clock::now();
+      begun_bytes_ = 0;
     }
   }
+
+  /// Into the database. A reader may hold it up; then the next time does it.
+  void empty_write_ahead_log() { database_->run("PRAGMA wal_checkpoint(PASSIVE)"); }
 
   /// SQLite may have rolled the transaction back by itself; then what waited in it is lost.
   void commit() {
@@ -211,6 +275,7 @@ class Rosbag2Writer::Bag {
   /// its end still fits; then there is room for nothing more.
   void abandon() noexcept {
     try {
+      reserve_.release();
       insert_.reset();
       if (database_) {
         commit();
@@ -224,6 +289,7 @@ class Rosbag2Writer::Bag {
   }
 
   fs::path folder_;
+  DiskReserve reserve_;
   std::optional<Database> database_;
   std::optional<Statement> insert_;
   std::map<std::string, std::int64_t> ids_;
@@ -234,6 +300,7 @@ class Rosbag2Writer::Bag {
   Nanoseconds durable_last_ns_{0};
   std::uint64_t messages_{0};
   std::chrono::steady_clock::time_point begun_;
+  std::uint64_t begun_bytes_{0};  ///< written since then
 };
 
 Rosbag2Writer::Rosbag2Writer(const std::string& folder, std::uint64_t largest_bytes)

@@ -55,7 +55,7 @@ std::string suggestion(const std::vector<TopicSummary>& topics, const Wanted& wa
         return topic.type == wanted.type;
       });
   if (candidates.empty()) {
-    return std::string("; no topic of type ") + wanted.type + " is in the log";
+    return std::string("; no topic of type ") + wanted.type + " is in the log.";
   }
   const auto nearest = std::min_element(
       candidates.begin(), candidates.end(), [&](const TopicSummary& a, const TopicSummary& b) {
@@ -102,6 +102,9 @@ TopicChoice choose_topics(const LogSummary& log,
   const bool empty = std::all_of(log.topics.begin(),
                                  log.topics.end(),
                                  [](const TopicSummary& topic) { return topic.messages == 0; });
+  if (empty && !log.faults.empty()) {
+    throw LogError(log.faults.front() + "; nothing is left to be used");
+  }
   if (empty) {
     throw LogError(log.path + ": the log is empty (no message in " +
                    std::to_string(log.topics.size()) + " topics)");

@@ -99,6 +99,30 @@ TEST(ImuChecks, refuses_rates_in_degrees_and_impossible_forces) {
   EXPECT_EQ(checks.check(hard).reason, "imu_out_of_range");
 }
 
+TEST(ImuChecks, refuses_a_gyro_in_degrees_from_its_first_turn_on) {
+  ImuChecks checks(Config{}, Eigen::Quaterniond::Identity());
+  ImuVerdict verdict;
+  for (int i = 0; i < 200; ++i) {
+    ImuSample sample = imu_at(0.01 * i);
+    sample.gyro_radps.z() = 17.2 + 1e-3 * (i % 7);
+    verdict = checks.check(sample);
+  }
+  EXPECT_EQ(verdict.reason, "imu_gyro_in_degrees");
+  EXPECT_NE(verdict.text.find("0.0174533"), std::string::npos) << verdict.text;
+  EXPECT_TRUE(checks.is_faulty());
+}
+
+TEST(ImuChecks, passes_a_turn_in_place_at_90_degrees_a_second) {
+  ImuChecks checks(Config{}, Eigen::Quaterniond::Identity());
+  ImuVerdict verdict;
+  for (int i = 0; i < 500; ++i) {
+    ImuSample sample = imu_at(0.01 * i);
+    sample.gyro_radps.z() = 1.5708 + 1e-3 * (i % 7);
+    verdict = checks.check(sample);
+  }
+  EXPECT_TRUE(verdict.sample);
+}
+
 TEST(ImuChecks, refuses_an_imu_that_is_stuck) {
   ImuChecks checks = warm_checks();
   ImuVerdict verdict;

@@ -134,18 +134,28 @@ TEST(KittiDrive, names_file_and_line_of_what_is_damaged) {
               HasSubstr("timestamps_end.txt:2"));
 }
 
-TEST(KittiDrive, a_truncated_sweep_is_an_error_after_what_came_before) {
+TEST(KittiDrive, a_truncated_sweep_is_skipped_and_counted) {
   SmallDrive drive;
-  fs::resize_file(drive.sync() / "velodyne_points/data/0000000002.bin", 10);
+  fs::resize_file(drive.sync() / "velodyne_points/data/0000000000.bin", 10);
   const auto log = open_log(drive.path(), RobotConfig{});
-  int sweeps = 0;
-  const auto told = message_of<LogError>([&] {
-    while (const auto entry = log->next()) {
-      sweeps += std::holds_alternative<PointCloudMessage>(entry->measurement) ? 1 : 0;
-    }
-  });
-  EXPECT_EQ(1, sweeps);
-  EXPECT_THAT(told, AllOf(HasSubstr("0000000002.bin"), HasSubstr("truncated")));
+  EXPECT_EQ(1U, only<PointCloudMessage>(read_all(*log)).size()) << "the later one";
+  const Events events = log->take_events();
+  ASSERT_EQ(1U, events.size());
+  EXPECT_THAT(events[0].text, AllOf(HasSubstr("0000000000.bin"), HasSubstr("truncated")));
+  ASSERT_EQ(1U, log->undecodable().size());
+  EXPECT_EQ("points", log->undecodable()[0].input);
+  EXPECT_EQ(1U, log->undecodable()[0].count);
+}
+
+TEST(KittiDrive, says_what_is_assumed_where_the_calibration_is_missing) {
+  SmallDrive drive;
+  RobotConfig robot;
+  robot.lidar_position_base_m = {0.25, 0.0, 1.5};
+  EXPECT_THAT(open_log(drive.path(), robot)->summary().faults,
+              testing::ElementsAre(AllOf(HasSubstr("calib_imu_to_velo.txt is missing"),
+                                         HasSubstr("[0.25, 0, 1.5]"))));
+  drive.write("calib_imu_to_velo.txt", "R: 1 0 0 0 1 0 0 0 1\nT: 0 0 0\n");
+  EXPECT_TRUE(open_log(drive.path(), robot)->summary().faults.empty());
 }
 
 class RealKitti : public testing::Test {

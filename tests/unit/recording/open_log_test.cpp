@@ -72,7 +72,7 @@ TEST_F(OpenLog, says_that_a_log_has_no_imu_at_all) {
   }
   EXPECT_THAT(refusal(path, RobotConfig{}),
               AllOf(HasSubstr("'imu/data'"),
-                    HasSubstr("no topic of type sensor_msgs/msg/Imu is in the log")));
+                    HasSubstr("no topic of type sensor_msgs/msg/Imu is in the log. The log has:")));
 }
 
 TEST_F(OpenLog, refuses_a_topic_of_another_type) {
@@ -92,6 +92,14 @@ TEST_F(OpenLog, refuses_what_is_no_log) {
   std::ofstream(folder_ / "notes.txt") << "hello";
   EXPECT_THAT(refusal((folder_ / "notes.txt").string(), RobotConfig{}),
               HasSubstr("no log that is known here"));
+}
+
+TEST_F(OpenLog, refuses_devices_and_files_beside_a_log_with_a_hint) {
+  EXPECT_THAT(refusal("/dev/null", RobotConfig{}), HasSubstr("no log that is known here"));
+  std::ofstream(folder_ / "map.pcd") << "# .PCD";
+  EXPECT_THAT(refusal((folder_ / "map.pcd").string(), RobotConfig{}),
+              AllOf(HasSubstr("map.pcd"), HasSubstr("or a scenario")));
+  EXPECT_THAT(refusal(recorded() + "/metadata.yaml", RobotConfig{}), HasSubstr("name the folder"));
 }
 
 TEST_F(OpenLog, refuses_an_empty_log) {

@@ -151,6 +151,7 @@ TEST_P(Rosbag1, a_truncated_bag_delivers_what_came_before_then_says_so) {
     }
   });
   EXPECT_THAT(told, AllOf(HasSubstr("breaks off after"), HasSubstr("drive.bag")));
+  EXPECT_THAT(log->summary().faults, testing::ElementsAre(HasSubstr("breaks off after")));
   EXPECT_LT(entries.size(), 240U);
   expect_the_samples(entries, 50, 5);
 }
@@ -165,6 +166,24 @@ INSTANTIATE_TEST_SUITE_P(Compressions,
                                   : param.param == rosbag::compression::BZ2        ? "bz2"
                                                                                    : "lz4";
                          });
+
+TEST(Rosbag1Cut, says_that_a_bag_is_cut_in_its_header) {
+  TemporaryFolder folder;
+  const auto file = record(folder / "drive.bag", rosbag::compression::Uncompressed);
+  for (const std::uintmax_t bytes : {100U, 20U, 8U}) {
+    fs::resize_file(file, bytes);
+    EXPECT_THAT(
+        message_of<LogError>([&] { open_log(file.string(), RobotConfig{}); }),
+        AllOf(
+            HasSubstr("drive.bag"), HasSubstr("cut off in its"), HasSubstr(std::to_string(bytes))));
+  }
+}
+
+TEST(Rosbag1Cut, is_recognised_without_its_extension) {
+  TemporaryFolder folder;
+  const auto file = record(folder / "drive", rosbag::compression::Uncompressed);
+  EXPECT_EQ(240U, read_all(*open_log(file.string(), RobotConfig{})).size());
+}
 
 TEST(Rosbag1Real, needs_points_unless_told_otherwise) {
   const std::string file = std::string(TRIGPOINT_SHARED_DATA) + "/robot_localization/test1.bag";

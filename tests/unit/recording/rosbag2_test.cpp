@@ -9,10 +9,12 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sqlite3.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <yaml-cpp/yaml.h>
 
 #include <fstream>
+#include <sstream>
 
 namespace trigpoint::recording {
 namespace {
@@ -257,19 +259,135 @@ TEST(Rosbag2, a_truncated_file_delivers_what_came_before_then_says_so) {
   EXPECT_EQ(sample_imu(20).gyro_radps, only<ImuSample>(entries).at(20).gyro_radps);
 }
 
-TEST(Rosbag2, a_damaged_message_is_told_with_its_topic) {
+TEST(Rosbag2, damaged_messages_are_skipped_told_once_and_counted) {
+  TemporaryFolder folder;
+  const auto path = (folder / "log").string();
+  {
+    Rosbag2Writer writer(path);
+    const std::vector<std::uint8_t> rubbish{0, 1, 0, 0, 9};
+    for (int i = 0; i < 3; ++i) {
+      writer.write_cdr(
+          "imu/data", "sensor_msgs/msg/Imu", kStart_ns + (2 + i) * kMillisecond_ns, rubbish);
+    }
+    writer.write_cdr("points", "sensor_msgs/msg/PointCloud2", kStart_ns, rubbish);
+    write_drive(writer);
+  }
+  const auto log = open_log(path, RobotConfig{});
+  EXPECT_EQ(120U, read_all(*log).size()) << "the log goes on";
+  const Events events = log->take_events();
+  ASSERT_EQ(2U, events.size()) << "once a topic";
+  EXPECT_THAT(events[0].text,
+              testing::AllOf(HasSubstr("message 1 of '/points'"), HasSubstr("5 bytes")));
+  EXPECT_THAT(events[1].text, HasSubstr("message 2 of '/imu/data'"));
+  EXPECT_TRUE(log->take_events().empty());
+  const auto counts = log->undecodable();
+  ASSERT_EQ(2U, counts.size());
+  EXPECT_EQ("imu", counts[1].input);
+  EXPECT_EQ(3U, counts[1].count);
+  EXPECT_THAT(undecodable_events(*log)[1].text, HasSubstr("3 messages of '/imu/data'"));
+}
+
+TEST(Rosbag2, is_salvaged_where_sqlite_cannot_walk_it_with_sqlite_s_own_words) {
+  TemporaryFolder folder;
+  const auto path = (folder / "log").string();
+  {
+    Rosbag2Writer writer(path);
+    // Large enough for a page between root and leaves, which lies late in the file.
+    for (int i = 0; i < 4000; ++i) {
+      writer.write("imu/data", sample_imu(i).stamp_ns, sample_imu(i));
+      if (i % 10 == 0) {
+        writer.write("points", sample_imu(i).stamp_ns, sample_cloud(i, 1000));
+        writer.write("gps/fix", sample_imu(i).stamp_ns, sample_fix(i));
+      }
+    }
+  }
+  const auto file = only_db3(path);
+  fs::resize_file(file, fs::file_size(file) / 2);
+  const auto log = open_log(path, RobotConfig{});
+  ASSERT_EQ(1U, log->summary().faults.size());
+  EXPECT_THAT(log->summary().faults[0],
+              testing::AllOf(HasSubstr("log_0.db3"), HasSubstr("malformed")));
+  std::vector<LogEntry> entries;
+  const auto told = message_of<LogError>([&] {
+    while (auto entry = log->next()) {
+      entries.push_back(*entry);
+    }
+  });
+  EXPECT_THAT(told, testing::AllOf(HasSubstr("malformed"), HasSubstr("breaks off")));
+  const auto imu = only<ImuSample>(entries);
+  ASSERT_GT(imu.size(), 1000U);
+  for (std::size_t i = 0; i < 1000; ++i) {
+    ASSERT_EQ(sample_imu(static_cast<int>(i)).gyro_radps, imu[i].gyro_radps);
+  }
+  const auto clouds = only<PointCloudMessage>(entries);
+  ASSERT_GT(clouds.size(), 100U);
+  EXPECT_EQ(sample_cloud(990, 1000).data, clouds[99].data) << "over several pages";
+}
+
+TEST(Rosbag2, a_folder_without_metadata_is_a_fault) {
   TemporaryFolder folder;
   const auto path = (folder / "log").string();
   {
     Rosbag2Writer writer(path);
     write_drive(writer);
-    const std::vector<std::uint8_t> rubbish{0, 1, 0, 0, 9};
-    writer.write_cdr("imu/data", "sensor_msgs/msg/Imu", kStart_ns + kNanosecondsPerSecond, rubbish);
   }
+  EXPECT_TRUE(open_log(path, RobotConfig{})->summary().faults.empty());
+  fs::remove(folder / "log" / "metadata.yaml");
   const auto log = open_log(path, RobotConfig{});
-  const auto told = message_of<LogError>([&] { read_all(*log); });
-  EXPECT_THAT(told, HasSubstr("/imu/data"));
-  EXPECT_THAT(told, HasSubstr("damaged"));
+  EXPECT_THAT(log->summary().faults, testing::ElementsAre(HasSubstr("no metadata.yaml")));
+  EXPECT_EQ(120U, read_all(*log).size());
+}
+
+TEST(Rosbag2, empties_its_write_ahead_log_while_it_writes) {
+  TemporaryFolder folder;
+  const auto path = (folder / "log").string();
+  constexpr std::uint32_t kPoints = 20'000;
+  constexpr int kClouds = 100;
+  Rosbag2Writer writer(path);
+  const auto cloud = sample_cloud(0, kPoints);
+  for (int i = 0; i < kClouds; ++i) {
+    writer.write("points", kStart_ns + i * kMillisecond_ns, cloud);
+  }
+  const auto written = kClouds * cloud.data.size();
+  EXPECT_LT(fs::file_size(folder / "log" / "log_0.db3-wal"), written / 2);
+  EXPECT_GT(fs::file_size(folder / "log" / "log_0.db3"), written / 2);
+}
+
+/// A limit on the size of each file is worse than a full disk: no room that is given back helps the
+/// database, so that its last messages stay in the write-ahead log. With TMPDIR on a small tmpfs it
+/// is the disk that is full.
+TEST(Rosbag2, on_a_disk_that_takes_no_more_what_was_written_before_is_readable_and_counted) {
+  TemporaryFolder folder;
+  const auto path = (folder / "log").string();
+  const auto count_file = folder / "count";
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{20U << 20U, 20U << 20U};
+    setrlimit(RLIMIT_FSIZE, &limit);
+    std::string told;
+    try {
+      Rosbag2Writer writer(path);
+      for (int i = 0; i < 1000; ++i) {
+        writer.write("points", kStart_ns + i * kMillisecond_ns, sample_cloud(i % 50, 5000));
+      }
+    } catch (const LogError& error) {
+      told = error.what();
+    }
+    std::ofstream(count_file) << told;
+    _exit(0);
+  }
+  waitpid(child, nullptr, 0);
+  std::stringstream told;
+  told << std::ifstream(count_file).rdbuf();
+  LogOptions points_alone;
+  points_alone.require_imu = false;
+  points_alone.require_fix = false;
+  const auto log = open_log(path, RobotConfig{}, points_alone);
+  const auto kept = read_all(*log).size();
+  EXPECT_GT(kept, 100U);
+  EXPECT_THAT(told.str(), HasSubstr("with " + std::to_string(kept) + " messages"));
 }
 
 TEST(Rosbag2, never_writes_over_another_recording) {

@@ -78,7 +78,8 @@ class LogPart {
  public:
   explicit LogPart(const std::string& session);
   void on_entry(const recording::LogEntry& entry);
-  void close();
+  /// `log` is what the entries came from; it knows what it passed over.
+  void close(const recording::LogReader& log);
   /// Copies the truth that lies beside the log, if any; for scoring only.
   void keep_truth(const recording::LogReader& log) const;
 

@@ -44,6 +44,17 @@ struct LogSummary {
   Nanoseconds first_ns{0};
   Nanoseconds last_ns{0};
   std::vector<TopicSummary> topics;
+  /// What is wrong with the log as a whole, in sentences: cut off, damaged, its recorder was
+  /// killed, a file of it is missing. Empty when nothing is known to be wrong.
+  std::vector<std::string> faults;
+};
+
+/// Messages that were passed over because they are not what their topic promises.
+struct Undecodable {
+  std::string input;   ///< "points", "imu" or "fix"
+  std::string topic;   ///< as the log spells it
+  std::string reason;  ///< e.g. "not a sensor_msgs/msg/Imu"
+  std::uint64_t count{0};
 };
 
 class LogReader {
@@ -57,6 +68,12 @@ class LogReader {
   /// 0 to 1, for progress bars.
   virtual double progress() const = 0;
 
+  /// What next() has passed over so far, by topic and reason.
+  virtual std::vector<Undecodable> undecodable() const { return {}; }
+
+  /// What there is to tell since the last call: the first message of a topic that was passed over.
+  virtual Events take_events() { return {}; }
+
   /// A trajectory file (TUM) with the truth beside the log, if there is one.
   virtual std::optional<std::string> truth_file() const { return std::nullopt; }
 
@@ -64,6 +81,13 @@ class LogReader {
   /// user's configuration leaves at its default is taken from here.
   virtual std::optional<RobotConfig> robot() const { return std::nullopt; }
 };
+
+/// The log's faults as warnings, for before the first entry.
+Events fault_events(const LogSummary& summary);
+
+/// How many messages were passed over, an event for each topic and reason, for after the last
+/// entry.
+Events undecodable_events(const LogReader& log);
 
 /// What is asked of a log.
 struct LogOptions {
@@ -79,9 +103,9 @@ struct LogOptions {
   double elevation_correction_rad{0.0};
 };
 
-/// Opens a ROS 1 bag (.bag), a rosbag2 folder or .db3 file, or a KITTI raw drive folder. Throws
-/// LogError when the path does not exist, is empty, is of no known kind, or lacks a mapped topic
-/// (naming it, what is there instead, and the nearest name).
+/// Opens a ROS 1 bag (known by its first line), a rosbag2 folder or .db3 file, or a KITTI raw drive
+/// folder. Throws LogError when the path does not exist, is empty, is of no known kind, or lacks a
+/// mapped topic (naming it, what is there instead, and the nearest name).
 std::unique_ptr<LogReader> open_log(const std::string& path, const RobotConfig& robot);
 std::unique_ptr<LogReader> open_log(const std::string& path,
                                     const RobotConfig& robot,

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "measurement_checks.hpp"
+
+#include "samples.hpp"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace trigpoint::recording {
+namespace {
+
+using testing::AllOf;
+using testing::Contains;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+TEST(MeasurementChecks, counts_imu_samples_that_are_not_finite) {
+  MeasurementChecks checks;
+  for (int i = 0; i < 200; ++i) {
+    ImuSample imu = sample_imu(i);
+    imu.gyro_radps = {0.1, 0.2, 0.3};
+    imu.accel_mps2.x() = i % 50 == 0 ? kNan : 0.0;
+    checks.take(imu);
+  }
+  EXPECT_THAT(checks.remarks(),
+              testing::ElementsAre(AllOf(HasSubstr("NaN"), HasSubstr("4 times"))));
+}
+
+TEST(MeasurementChecks, counts_fixes_whose_position_or_covariance_is_not_finite) {
+  MeasurementChecks checks;
+  GnssFix fix = sample_fix(0);
+  fix.latitude_deg = kNan;
+  checks.take(fix);
+  fix = sample_fix(1);
+  fix.covariance_enu_m2.setConstant(kNan);
+  checks.take(fix);
+  EXPECT_THAT(checks.remarks(), Contains(HasSubstr("a position that is not finite")));
+  EXPECT_THAT(checks.remarks(), Contains(HasSubstr("a covariance that is not finite")));
+}
+
+TEST(MeasurementChecks, does_not_ask_of_our_own_topics_what_only_sensors_have) {
+  PointCloudMessage map = sample_cloud(0);
+  map.fields.pop_back();
+  GnssFix datum = sample_fix(0);
+  datum.stamp_ns = 0;
+  datum.covariance_type = CovarianceType::kUnknown;
+  datum.covariance_enu_m2.setZero();
+  MeasurementChecks our_map(MeasurementChecks::Origin::kOurs);
+  our_map.take(map);
+  EXPECT_THAT(our_map.remarks(), IsEmpty());
+  MeasurementChecks our_datum(MeasurementChecks::Origin::kOurs);
+  our_datum.take(datum);
+  EXPECT_THAT(our_datum.remarks(), IsEmpty());
+  MeasurementChecks of_a_lidar;
+  of_a_lidar.take(map);
+  EXPECT_THAT(of_a_lidar.remarks(), testing::ElementsAre(HasSubstr("carry no time")));
+  MeasurementChecks of_a_receiver;
+  of_a_receiver.take(datum);
+  EXPECT_THAT(of_a_receiver.remarks(), Contains(HasSubstr("a stamp of 0")));
+  EXPECT_THAT(of_a_receiver.remarks(), Contains(HasSubstr("nothing of its covariance")));
+}
+
+}  // namespace
+}  // namespace trigpoint::recording
