@@ -201,7 +201,7 @@ void find_missing_counts(const SessionData& data, Findings& findings) {
     }
   }
   if (there(file::kFixes) && !published(data, "fix")) {
-    findings.losses.push_back("no counts of the log: the player ended without closing its part");
+    findings.losses.push_back("no counts of the log: what read it ended without closing its part");
   }
 }
 
