@@ -12,7 +12,8 @@
 
 namespace trigpoint::cli {
 
-/// Returns the exit code: 0 done, 1 failed, 2 wrong usage or configuration.
+/// Returns the exit code: 0 done, 1 failed, 2 wrong usage or configuration, 130
+/// interrupted.
 using Chosen = std::function<int()>;
 
 void add_config(CLI::App& app, Chosen& chosen);
