@@ -7,6 +7,7 @@
 #include "trigpoint/simulator/scenario.hpp"
 #include "trigpoint/simulator/simulator.hpp"
 
+#include "finish_session.hpp"
 #include "number_checks.hpp"
 
 #include <algorithm>
@@ -96,6 +97,9 @@ SystemConfig configure(const InputOptions& options, const Known& known) {
   load(config, options.config_files);
   if (!options.mode.empty()) {
     set_mode(config, options.mode);
+  }
+  if (mode_of(config) == "lio") {
+    config.log.require_fix = false;  // nothing would use them
   }
   if (options.duration_s > 0.0) {
     config.log.duration_s = options.duration_s;

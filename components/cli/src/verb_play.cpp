@@ -49,27 +49,41 @@ class SessionPart {
     }
   }
 
-  void close(const recording::LogReader& reader, const SystemConfig& config, double wall_s) {
-    if (!part_) {
-      return;
+  /// What is known before the first message, so that a player that is killed leaves it.
+  void begin(const recording::LogReader& reader, const SystemConfig& config) {
+    if (part_) {
+      disk_.keep([&] {
+        write_run(reader, config, 0.0);
+        part_->keep_truth(reader);
+      });
     }
-    disk_.keep([&] {
-      namespace file = exporter::session_file;
-      part_->close(reader);
-      exporter::write_run(exporter::path_in(folder_, file::kRun),
-                          {reader.summary().path,
-                           "dds",
-                           mode_of(config),
-                           config.cores.gps_odometry.filter,
-                           to_seconds(part_->last_ns() - part_->first_ns()),
-                           wall_s});
-      part_->keep_truth(reader);
-    });
+  }
+
+  void close(const recording::LogReader& reader, const SystemConfig& config, double wall_s) {
+    if (part_) {
+      disk_.keep([&] {
+        part_->close(reader);
+        write_run(reader, config, wall_s);
+        part_->keep_truth(reader);
+      });
+    }
   }
 
   bool failed() const { return disk_.failed(); }
 
  private:
+  void write_run(const recording::LogReader& reader,
+                 const SystemConfig& config,
+                 double wall_s) const {
+    exporter::write_run(exporter::path_in(folder_, exporter::session_file::kRun),
+                        {reader.summary().path,
+                         "dds",
+                         mode_of(config),
+                         config.cores.gps_odometry.filter,
+                         to_seconds(part_->last_ns() - part_->first_ns()),
+                         wall_s});
+  }
+
   std::string folder_;
   shell::DiskGuard disk_;
   std::optional<pipeline::LogPart> part_;
@@ -120,6 +134,7 @@ int run(const PlayVerbOptions& options) {
     return code;
   }
   SessionPart session(options.session, log);
+  session.begin(*input.reader, input.config);
   Progress progress("playing");
   recording::PlayOptions play;
   play.robot = input.config.cores.robot;
