@@ -14,7 +14,9 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kHonestSigmas = 5.0;
-constexpr double kUsefulSigma_m = 0.5;  // the gate's default threshold
+constexpr double kNinetyFivePercent = 1.96;
+constexpr double kClaimedYaw_rad2 = 1.0;  // above it no heading is claimed
+constexpr double kUsefulSigma_m = 0.5;    // the gate's default threshold
 
 /// Truth in the map of the filter's own datum.
 class TrueMap {
@@ -68,65 +70,74 @@ class HonestyJudge {
     checks_.push_back({name, passed, figures});
   }
 
+  /// The worst of what is claimed.
+  struct Tally {
+    double position{0.0};
+    double position_at_s{0.0};
+    double yaw{0.0};
+    double velocity{0.0};
+    double error2_m2{0.0};
+    std::size_t inside{0};
+    std::size_t compared{0};
+    std::vector<double> sigmas_m;  ///< while fixes come
+
+    double median_m() {
+      const auto middle = sigmas_m.begin() + static_cast<std::ptrdiff_t>(sigmas_m.size() / 2);
+      std::nth_element(sigmas_m.begin(), middle, sigmas_m.end());
+      return sigmas_m.empty() ? kNaN : *middle;
+    }
+  };
+
+  void compare(const Odometry& o, const TrueMap& map, Tally& tally) const {
+    const Vector3d error =
+        o.T_frame_child.p - map.position(o.stamp_ns, o.child_frame_id == "gnss_antenna");
+    const double off = ratio(error, o.pose_covariance.diagonal().head<3>());
+    if (off > tally.position) {
+      tally.position = off;
+      tally.position_at_s = drive_.since_start_s(o.stamp_ns);
+    }
+    tally.inside += off < kNinetyFivePercent ? 1 : 0;
+    ++tally.compared;
+    tally.error2_m2 += error.squaredNorm();
+    if (!drive_.in_outage(o.stamp_ns)) {
+      tally.sigmas_m.push_back(sigma_m(o));
+    }
+    if (o.pose_covariance(5, 5) < kClaimedYaw_rad2) {
+      const double yaw_rad = wrap_angle(yaw_of(o.T_frame_child.q) - map.yaw_rad(o.stamp_ns));
+      tally.yaw = std::max(tally.yaw, std::abs(yaw_rad) / std::sqrt(o.pose_covariance(5, 5)));
+    }
+    if (o.child_frame_id == "base_link" && o.twist_covariance(0, 0) < kKnownBelow) {
+      tally.velocity = std::max(
+          tally.velocity,
+          ratio(o.linear_mps - map.velocity(o.stamp_ns), o.twist_covariance.diagonal().head<3>()));
+    }
+  }
+
   void honesty() {
-    const TrueMap map(script_, truth_, record_.datums.back().message);
-    double worst = 0.0;
-    double worst_yaw = 0.0;
-    double worst_speed = 0.0;
-    double worst_at_s = 0.0;
-    double sum2 = 0.0;
-    std::size_t inside = 0;
-    std::size_t compared = 0;
-    std::vector<double> sigmas;
+    const TrueMap map(script_, drive_.truth, record_.datums.back().message);
+    Tally tally;
     for (const auto& heard : record_.odometry) {
-      const Odometry& o = heard.message;
-      if (!map.covers(o.stamp_ns)) {
-        continue;
-      }
-      const Vector3d error =
-          o.T_frame_child.p - map.position(o.stamp_ns, o.child_frame_id == "gnss_antenna");
-      const double sigmas_off = ratio(error, o.pose_covariance.diagonal().head<3>());
-      if (!(sigmas_off <= worst)) {
-        worst = sigmas_off;
-        worst_at_s = drive_.since_start_s(o.stamp_ns);
-      }
-      inside += sigmas_off < 1.96 ? 1 : 0;
-      ++compared;
-      sum2 += error.squaredNorm();
-      if (!drive_.in_outage(o.stamp_ns)) {
-        sigmas.push_back(sigma_m(o));
-      }
-      if (o.pose_covariance(5, 5) < 1.0) {
-        worst_yaw =
-            std::max(worst_yaw,
-                     std::abs(wrap_angle(yaw_of(o.T_frame_child.q) - map.yaw_rad(o.stamp_ns))) /
-                         std::sqrt(o.pose_covariance(5, 5)));
-      }
-      if (o.child_frame_id == "base_link" && o.twist_covariance(0, 0) < kKnownBelow) {
-        worst_speed = std::max(worst_speed,
-                               ratio(o.linear_mps - map.velocity(o.stamp_ns),
-                                     o.twist_covariance.diagonal().head<3>()));
+      if (map.covers(heard.message.stamp_ns)) {
+        compare(heard.message, map, tally);
       }
     }
-    std::nth_element(
-        sigmas.begin(), sigmas.begin() + static_cast<long>(sigmas.size() / 2), sigmas.end());
-    const double median_m = sigmas.empty() ? kNaN : sigmas[sigmas.size() / 2];
-    const double n = std::max(1.0, static_cast<double>(compared));
+    const double n = std::max(1.0, static_cast<double>(tally.compared));
     add("position bounded by sigma",
-        worst <= kHonestSigmas && compared > 0,
+        tally.position <= kHonestSigmas && tally.compared > 0,
         text("worst %.2f sigma at %.1f s (at most %.0f); %.1f %% within 1.96 sigma on all axes; "
              "rms %.3f m",
-             worst,
-             worst_at_s,
+             tally.position,
+             tally.position_at_s,
              kHonestSigmas,
-             100.0 * static_cast<double>(inside) / n,
-             std::sqrt(sum2 / n)));
+             100.0 * static_cast<double>(tally.inside) / n,
+             std::sqrt(tally.error2_m2 / n)));
     add("heading and velocity bounded",
-        worst_yaw <= kHonestSigmas && worst_speed <= kHonestSigmas,
+        tally.yaw <= kHonestSigmas && tally.velocity <= kHonestSigmas,
         text("worst %.2f sigma of yaw, %.2f of velocity, where they are claimed (at most %.0f)",
-             worst_yaw,
-             worst_speed,
+             tally.yaw,
+             tally.velocity,
              kHonestSigmas));
+    const double median_m = tally.median_m();
     add("sigma is of use",
         median_m <= kUsefulSigma_m,
         text("median %.3f m with fixes of 0.014 m (at most %.1f, or the gate never fuses)",

@@ -76,9 +76,16 @@ void InsTracker::warm_start(InsTrack& track, const WarmState& state) const {
   filter.q_map_base = state.T_map_base.q;
   filter.v_map_mps = state.T_map_base.q * state.linear_base_mps;
   const Matrix3d R = filter.R_map_base();
+  const Matrix3d rotation = R.transpose() * state.rotation_covariance_rad2 * R;
+  // v_map = R v_base: a wrong heading turns the velocity with it, and no wheel sees that.
+  const Matrix3d J = -R * hat(state.linear_base_mps);
   reset_block(filter, ins::kPosition, state.position_covariance_m2);
-  reset_block(filter, ins::kRotation, R.transpose() * state.rotation_covariance_rad2 * R);
-  reset_block(filter, ins::kVelocity, R * state.velocity_covariance_m2ps2 * R.transpose());
+  reset_block(filter, ins::kRotation, rotation);
+  reset_block(filter,
+              ins::kVelocity,
+              R * state.velocity_covariance_m2ps2 * R.transpose() + J * rotation * J.transpose());
+  filter.P.block<3, 3>(ins::kVelocity, ins::kRotation) = J * rotation;
+  filter.P.block<3, 3>(ins::kRotation, ins::kVelocity) = (J * rotation).transpose();
   track.phase = Phase::kRunning;
   track.warm_ns = track.stamp_ns;
 }
