@@ -219,7 +219,7 @@ class UtmStandIn : public ::testing::TestWithParam<std::pair<const char*, bool>>
 
 TEST_P(UtmStandIn, is_accepted_once_its_offset_yaw_and_scale_are_known) {
   for (const Datum& datum : {kOnMeridian, kFarEast}) {
-    for (unsigned seed = 1; seed <= 3; ++seed) {
+    for (unsigned seed = 1; seed <= (GetParam().second ? 1U : 2U); ++seed) {
       const StandIn result = drive_stand_in(datum, GetParam().second, seed);
       std::printf(
           "%s, %.1f E, scale %.6f, convergence %.2f deg: admitted after %.1f s, %zu fixes, "

@@ -24,6 +24,7 @@ struct Takeover {
   double first_sigmas{0.0};  ///< its worst axis
   double worst_sigmas{0.0};
   double first_sigma_m{0.0};
+  double worst_yaw_sigmas{0.0};
   double converged_s{kNaN};  ///< from the start to health OK
   double first_yaw_error_rad{0.0};
   GpsHealth first_health{GpsHealth::kInit};
@@ -88,12 +89,16 @@ Takeover swap(const std::string& first,
             .cwiseQuotient(odometry.pose_covariance.diagonal().head<3>().cwiseSqrt())
             .maxCoeff();
     result.worst_sigmas = std::max(result.worst_sigmas, sigmas);
+    const double yaw_error_rad = wrap_angle(yaw_of(odometry.T_frame_child.q) - now.yaw_rad);
+    result.worst_yaw_sigmas =
+        std::max(result.worst_yaw_sigmas,
+                 std::abs(yaw_error_rad) / std::sqrt(odometry.pose_covariance(5, 5)));
     if (std::isnan(result.first_s)) {
       result.first_s = input.available_s - start_s;
       result.first_sigmas = sigmas;
       result.first_sigma_m = std::sqrt(odometry.pose_covariance(0, 0));
       result.first_health = after.status().health;
-      result.first_yaw_error_rad = wrap_angle(yaw_of(odometry.T_frame_child.q) - now.yaw_rad);
+      result.first_yaw_error_rad = yaw_error_rad;
     }
   }
   result.datum_id = after.datum()->id();
@@ -112,6 +117,7 @@ TEST_P(WarmStart, gives_an_honest_position_within_two_seconds_and_is_degraded_un
     EXPECT_LT(warm.first_s, kFirstWithin_s);
     EXPECT_LT(warm.first_sigmas, kHonestSigmas);
     EXPECT_LT(warm.worst_sigmas, kWorstSigmas);
+    EXPECT_LT(warm.worst_yaw_sigmas, kWorstSigmas);
     EXPECT_LT(std::abs(warm.first_yaw_error_rad), 0.3);
     EXPECT_EQ(warm.first_health, GpsHealth::kDegraded);
     EXPECT_LT(warm.first_s, cold.first_s);
@@ -150,6 +156,17 @@ TEST_P(WarmStart, from_a_wrong_position_is_given_up_at_the_first_fix) {
   const Takeover cold = swap(first, second, 0.8, false);
   EXPECT_TRUE(wrong.warm);
   EXPECT_NEAR(wrong.converged_s, cold.converged_s, 2.0);
+}
+
+TEST_P(WarmStart, from_a_heading_that_is_off_keeps_its_sigma_until_fixes_correct_it) {
+  const auto [first, second] = GetParam();
+  for (const double off_rad : {-0.4, 0.4}) {  // under two sigmas of what a start may claim
+    const Takeover warm = swap(first, second, 0.8, true, [&](Odometry& o) {
+      o.T_frame_child.q = from_yaw(off_rad) * o.T_frame_child.q;
+    });
+    EXPECT_LT(warm.worst_yaw_sigmas, kHonestSigmas) << off_rad;
+    EXPECT_LT(warm.worst_sigmas, kWorstSigmas) << off_rad;
+  }
 }
 
 TEST_P(WarmStart, from_a_heading_that_is_turned_round_recovers) {
