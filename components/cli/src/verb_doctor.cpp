@@ -3,6 +3,7 @@
 #include "trigpoint/shell/shell.hpp"
 
 #include "bus_survey.hpp"
+#include "gps_filter_check.hpp"
 #include "input.hpp"
 #include "measurement_checks.hpp"
 #include "progress.hpp"
@@ -24,6 +25,8 @@ constexpr std::int64_t kWantedSocketBuffer_bytes = 4'194'304;
 struct DoctorOptions {
   InputOptions input;
   double seconds{5.0};
+  bool gps_filter{false};
+  double rate{5.0};
 };
 
 /// 0 when nothing is wrong.
@@ -170,9 +173,21 @@ void add_doctor(CLI::App& app, Chosen& chosen) {
   verb->add_option("--seconds", options->seconds, "listen to the bus for this long")
       ->capture_default_str()
       ->check(CLI::PositiveNumber);
-  verb->footer("Exit code 0: nothing wrong found; 1: see the lines with '!'.");
+  verb->add_flag("--gps-filter",
+                 options->gps_filter,
+                 "hold the GPS filter that runs on the bus against its contract, on a simulated "
+                 "drive that this command publishes (needs a bus without sensors)")
+      ->excludes("LOG");
+  verb->add_option("--rate", options->rate, "of that drive: at most so many times real time")
+      ->capture_default_str()
+      ->check(CLI::Range(0.1, 100.0))
+      ->needs("--gps-filter");
+  verb->footer("Exit code 0: nothing wrong found; 1: see the lines with '!' or 'FAIL'.");
   verb->callback([options, &chosen] {
     chosen = [options] {
+      if (options->gps_filter) {
+        return check_gps_filter(load_config_of(options->input), options->rate);
+      }
       return options->input.log.empty() ? examine_bus(*options) : examine_log(*options);
     };
   });

@@ -12,6 +12,8 @@
 #include "trigpoint/pipeline/session_parts.hpp"
 #include "trigpoint/shell/shell.hpp"
 
+#include "other_filters.hpp"
+
 #include <chrono>
 #include <optional>
 #include <string>
@@ -77,9 +79,13 @@ class Process {
         topics::datum,
         [this, &loop](const sensor_msgs::msg::NavSatFix& m, const bus::MessageInfo& info) {
           if (info.writer_guid != datum_.guid()) {
-            loop.post([this, d = bus::datum_from_message(m)] { take(core_.on_datum(d)); });
+            loop.post([this, d = bus::datum_from_message(m), writer = info.writer_guid] {
+              take(core_.on_datum(d));
+              warm_start(others_.on_datum_id(writer, d.id()));
+            });
           }
         });
+    listen_to_others(loop);
     imu_.emplace(participant_,
                  topics::imu.renamed(settings.robot.imu_topic),
                  [this, &loop](const sensor_msgs::msg::Imu& m, const bus::MessageInfo&) {
@@ -100,6 +106,47 @@ class Process {
   bool failed() const { return disk_.failed(); }
 
  private:
+  /// Only while the core wants it: other filters, and the gate that keeps the newest odometry of a
+  /// filter that has died.
+  void listen_to_others(bus::Loop& loop) {
+    const auto hear = [this, &loop](const nav_msgs::msg::Odometry& m,
+                                    const bus::MessageInfo& info) {
+      if (info.writer_guid != odometry_.guid()) {
+        loop.post(
+            [this, odometry = bus::from_message(m), writer = info.writer_guid] {
+              warm_start(others_.on_odometry(writer, odometry));
+            },
+            bus::WhenFull::kDropOldest);
+      }
+    };
+    other_odometry_.emplace(participant_, topics::gps_odometry, hear);
+    selected_.emplace(participant_, topics::gps_selected, hear);
+    other_status_.emplace(
+        participant_,
+        topics::gps_status,
+        [this, &loop](const trigpoint_msgs::msg::GpsStatus& m, const bus::MessageInfo& info) {
+          if (info.writer_guid != status_.guid()) {
+            loop.post(
+                [this, id = bus::from_message(m).datum_id, writer = info.writer_guid] {
+                  warm_start(others_.on_datum_id(writer, id));
+                },
+                bus::WhenFull::kDropOldest);
+          }
+        });
+  }
+
+  void warm_start(const std::optional<gps_odometry::OtherFilters::Heard>& heard) {
+    if (heard && core_.wants_odometry()) {
+      take(core_.on_odometry(heard->odometry, heard->datum_id));
+    }
+  }
+
+  void stop_listening_to_others() {
+    other_odometry_.reset();
+    selected_.reset();
+    other_status_.reset();
+  }
+
   template <typename Write>
   void keep(Write write) {
     if (session_) {
@@ -134,6 +181,9 @@ class Process {
   }
 
   void diagnose() {
+    if (!core_.wants_odometry()) {
+      stop_listening_to_others();
+    }
     const bus::Diagnostic line{level_of(last_.health),
                                "gps_odometry: fixes",
                                "accepted " + std::to_string(last_.fixes_accepted) + " of " +
@@ -155,6 +205,10 @@ class Process {
   bus::Publisher<sensor_msgs::msg::NavSatFix> datum_;
   bus::Publisher<diagnostic_msgs::msg::DiagnosticArray> diagnostics_;
   std::optional<bus::Subscription<sensor_msgs::msg::NavSatFix>> datums_;
+  gps_odometry::OtherFilters others_;
+  std::optional<bus::Subscription<nav_msgs::msg::Odometry>> other_odometry_;
+  std::optional<bus::Subscription<nav_msgs::msg::Odometry>> selected_;
+  std::optional<bus::Subscription<trigpoint_msgs::msg::GpsStatus>> other_status_;
   std::optional<bus::Subscription<sensor_msgs::msg::Imu>> imu_;
   std::optional<bus::Subscription<sensor_msgs::msg::NavSatFix>> fixes_;
 };

@@ -42,6 +42,7 @@ EkfTracker::EkfTracker(const Config& config, const Vector3d& lever_base_m)
 
 void EkfTracker::start(EkfTrack& track, const CheckedImu& imu) const {
   track.phase = Phase::kAligning;
+  track.warm_ns = 0;
   track.filter = Ekf15{};
   // Level: the mean specific force is up. Heading stays open: 0 in a frame of its own.
   const Eigen::Quaterniond level = rotation_between(imu.mean_accel_mps2, Vector3d::UnitZ());
@@ -59,7 +60,8 @@ MotionNoise EkfTracker::noise(const EkfTrack& track) const {
   // variance b^2 t^4 / 4; a random walk of the velocity with the rate 3 b^2 t makes the same. For a
   // gyro bias through the tilt, b^2 g^2 t^6 / 36, the rate is 3.3 b^2 t. So the rates grow with the
   // age of the last fix, from what fixes cannot see on.
-  const double age_s = track.accepted_ns > 0 ? to_seconds(track.stamp_ns - track.accepted_ns) : 0.0;
+  const Nanoseconds known_ns = std::max(track.accepted_ns, track.warm_ns);
+  const double age_s = known_ns > 0 ? to_seconds(track.stamp_ns - known_ns) : 0.0;
   const double gyro_horizon_s = std::max(config_.gyro_bias_horizon_s, kGyroBiasGrowth * age_s);
   const double accel_horizon_s = std::max(config_.accel_bias_horizon_s, kAccelBiasGrowth * age_s);
   MotionNoise noise;
@@ -109,13 +111,38 @@ FixOutcome EkfTracker::apply(EkfTrack& track, const MapFix& fix) const {
   }
   advance(track, fix.checked.stamp_ns);
   const bool lost =
-      track.phase == Phase::kRunning && yaw_sigma_rad(track) > config_.heading_lost_rad;
+      track.phase == Phase::kRunning && (yaw_sigma_rad(track) > config_.heading_lost_rad ||
+                                         (is_unconfirmed(track) && contradicts(track, fix)));
   if (lost) {
     track.phase = Phase::kAligning;
     track.heading.restart();
     track.accepted_ns = 0;  // whatever the fix says is better than this
   }
   return track.phase == Phase::kAligning ? align(track, fix) : filter_fix(track, fix);
+}
+
+/// A start from another filter's word that the very first fix contradicts was a wrong one.
+bool EkfTracker::contradicts(const EkfTrack& track, const MapFix& fix) const {
+  const auto H = antenna_jacobian(track.filter.x, lever_base_m_);
+  const Vector3d innovation = fix.antenna_map_m - expected_antenna(track.filter.x, lever_base_m_);
+  const Matrix3d S = H * track.filter.P * H.transpose() + fix.covariance_map_m2;
+  return !(innovation.head<2>().dot(S.topLeftCorner<2, 2>().ldlt().solve(innovation.head<2>())) <=
+           gate2_);
+}
+
+void EkfTracker::warm_start(EkfTrack& track, const WarmState& state) const {
+  Ekf15& filter = track.filter;
+  filter.x.segment<3>(kPosition) = state.T_map_base.p;
+  filter.x.segment<3>(kAttitude) = roll_pitch_yaw_of(state.T_map_base.q);
+  filter.x.segment<3>(kVelocity) = state.linear_base_mps;
+  reset_block(filter, kPosition, state.position_covariance_m2);
+  // Changes of roll, pitch, yaw from small rotations about the axes of map.
+  const Matrix3d J =
+      euler_from_body_rates(filter.x.segment<3>(kAttitude)) * filter.R_map_base().transpose();
+  reset_block(filter, kAttitude, J * state.rotation_covariance_rad2 * J.transpose());
+  reset_block(filter, kVelocity, state.velocity_covariance_m2ps2);
+  track.phase = Phase::kRunning;
+  track.warm_ns = track.stamp_ns;
 }
 
 double EkfTracker::teleport_limit_m(const EkfTrack& track, const MapFix& fix) const {

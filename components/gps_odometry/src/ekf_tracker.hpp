@@ -8,6 +8,7 @@
 #include "heading.hpp"
 #include "imu_checks.hpp"
 #include "track.hpp"
+#include "warm_start.hpp"
 #include <Eigen/Core>
 
 #include <string>
@@ -34,6 +35,8 @@ class EkfTracker {
 
   void apply(EkfTrack& track, const CheckedImu& imu) const;
   FixOutcome apply(EkfTrack& track, const MapFix& fix) const;
+  /// Goes on from another filter's state; the phase becomes kRunning.
+  void warm_start(EkfTrack& track, const WarmState& state) const;
 
   /// Position of base_link with covariance as it may be published, order x y z roll pitch yaw about
   /// the axes of map.
@@ -65,6 +68,7 @@ class EkfTracker {
 
   FixOutcome align(EkfTrack& track, const MapFix& fix) const;
   void begin_running(EkfTrack& track, const MapFix& fix, const HeadingEstimate& heading) const;
+  bool contradicts(const EkfTrack& track, const MapFix& fix) const;
   FixOutcome filter_fix(EkfTrack& track, const MapFix& fix) const;
   FixOutcome refuse(EkfTrack& track,
                     const MapFix& fix,

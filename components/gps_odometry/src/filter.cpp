@@ -45,6 +45,10 @@ class BufferedFilter : public Filter {
 
   void announce_reset(const YawPose& delta) override { buffer_.announce_reset(delta); }
 
+  void warm_start(const WarmState& state) override {
+    buffer_.replace_newest([&](auto& track) { tracker_.warm_start(track, state); });
+  }
+
   const Track& newest() const override { return buffer_.newest(); }
 
   Estimate estimate() const override { return tracker_.estimate(buffer_.newest()); }

@@ -9,6 +9,7 @@
 
 #include "imu_checks.hpp"
 #include "track.hpp"
+#include "warm_start.hpp"
 
 #include <memory>
 #include <optional>
@@ -34,6 +35,8 @@ class Filter {
   virtual void restart() = 0;
   virtual void change_frame(const Eigen::Matrix3d& R_new_old, const Eigen::Vector3d& t_new_old) = 0;
   virtual void announce_reset(const YawPose& delta) = 0;
+  /// The newest state goes on from here; what was measured before is forgotten.
+  virtual void warm_start(const WarmState& state) = 0;
 
   // Of the newest state.
   virtual const Track& newest() const = 0;

@@ -12,6 +12,7 @@
 #include "fix_checks.hpp"
 #include "imu_checks.hpp"
 #include "status.hpp"
+#include "warm_start.hpp"
 
 #include <cmath>
 
@@ -71,6 +72,7 @@ struct GpsOdometry::Impl {
   void elect(const CheckedFix& fix, Output& output);
   void move_to(const Datum& new_datum);
   void publish_odometry(Output& output);
+  void try_warm_start(Output& output);
   Odometry odometry() const;
   GpsStatus status() const;
   Surroundings around() const;
@@ -83,6 +85,7 @@ struct GpsOdometry::Impl {
   std::unique_ptr<Filter> filter;
   DatumElection election;
   FrozenReceiver frozen;
+  WarmStartListener warm;
   Counters counters;
   std::uint64_t fixes_received{0};
   std::uint64_t imu_received{0};
@@ -126,6 +129,8 @@ void GpsOdometry::Impl::take_imu(const ImuSample& sample, Output& output) {
     now_ns = filter->newest_imu_ns() ? std::max(now_ns, sample.stamp_ns) : sample.stamp_ns;
     fixes_ahead = 0;
     filter->insert(*verdict.sample);
+    warm.advance(sample.stamp_ns);
+    try_warm_start(output);
     publish_odometry(output);
   }
   if (!status_ns || now_ns - *status_ns >= kStatusInterval_ns) {
@@ -278,6 +283,49 @@ void GpsOdometry::Impl::move_to(const Datum& new_datum) {
   datum = new_datum;
 }
 
+// ---- warm start ---------------------------------------------------------------------------------
+
+void GpsOdometry::Impl::try_warm_start(Output& output) {
+  const Track& track = filter->newest();
+  if (!warm.is_open() || track.phase == Phase::kRunning) {
+    if (!warm.fault.empty()) {
+      output.events.push_back(
+          {Severity::kWarning,
+           track.stamp_ns,
+           "no_warm_start",
+           "The odometry of another filter was heard, but " + warm.fault + "."});
+      warm.fault.clear();
+    }
+    warm.close();
+    return;
+  }
+  if (!datum || !warm.heard() || track.phase != Phase::kAligning) {
+    return;
+  }
+  const Odometry& heard = warm.heard()->odometry;
+  const double age_s = to_seconds(track.stamp_ns - heard.stamp_ns);
+  const auto fault = find_warm_start_fault(heard, warm.heard()->datum_id, datum->id());
+  const auto state = fault ? std::nullopt : carry_to(heard, track.stamp_ns);
+  if (!state) {
+    // A better one may come while listening goes on.
+    warm.fault = fault.value_or("it is " + std::to_string(age_s) + " s old");
+    return;
+  }
+  const Pose before = filter->estimate().T_map_base;
+  filter->warm_start(*state);
+  if (track.accepted_ns > 0) {
+    filter->announce_reset({yaw_of(state->T_map_base.q), state->T_map_base.p - before.p});
+  }
+  warm.close();
+  warm.fault.clear();
+  output.events.push_back({Severity::kInfo,
+                           track.stamp_ns,
+                           "warm_start",
+                           "Begun from another filter's odometry, " + std::to_string(age_s) +
+                               " s old; heading sigma " + std::to_string(filter->yaw_sigma_rad()) +
+                               " rad."});
+}
+
 // ---- output -------------------------------------------------------------------------------------
 
 Odometry GpsOdometry::Impl::odometry() const {
@@ -296,7 +344,8 @@ Odometry GpsOdometry::Impl::odometry() const {
 
 void GpsOdometry::Impl::publish_odometry(Output& output) {
   const Track& track = filter->newest();
-  if (!datum || track.phase == Phase::kNoImu || track.accepted_ns == 0) {
+  if (!datum || track.phase == Phase::kNoImu ||
+      (track.accepted_ns == 0 && !is_unconfirmed(track))) {
     return;
   }
   // A tenth of a period of tolerance: stamps of a 100 Hz IMU jitter.
@@ -389,6 +438,16 @@ Output GpsOdometry::on_datum(const Datum& candidate) {
     }
   }
   return output;
+}
+
+Output GpsOdometry::on_odometry(const Odometry& odometry, const std::string& datum_id) {
+  Output output;
+  impl_->warm.hear(odometry, datum_id);
+  return output;
+}
+
+bool GpsOdometry::wants_odometry() const {
+  return impl_->warm.is_open();
 }
 
 std::optional<Datum> GpsOdometry::datum() const {

@@ -60,7 +60,10 @@ FixOutcome InsTracker::apply(InsTrack& track, const MapFix& fix) const {
     return {false, "before_imu", "Fix refused: there is no usable IMU sample yet."};
   }
   advance(track, fix.checked.stamp_ns);
-  if (track.phase == Phase::kRunning && filter_yaw_sigma_rad(track) > config_.heading_lost_rad) {
+  // A start from another filter's word that the very first fix contradicts was a wrong one.
+  const bool wrong = is_unconfirmed(track) && !(judge(track.filter, fix).ratio[kHorizontal] <= 1.0);
+  if (track.phase == Phase::kRunning &&
+      (wrong || filter_yaw_sigma_rad(track) > config_.heading_lost_rad)) {
     track.phase = Phase::kAligning;
     track.has_rival = false;
     track.heading.restart();

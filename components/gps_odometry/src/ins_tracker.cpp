@@ -51,6 +51,7 @@ InsTracker::InsTracker(const Config& config, const Vector3d& lever_base_m)
 void InsTracker::start(InsTrack& track, const CheckedImu& imu) const {
   const Eskf18Config& c = config_.eskf18;
   track.phase = Phase::kAligning;
+  track.warm_ns = 0;
   track.has_rival = false;
   track.filter = Eskf18{};
   // Level: the mean specific force is up. Heading stays open: 0 in a frame of its own.
@@ -67,6 +68,26 @@ void InsTracker::start(InsTrack& track, const CheckedImu& imu) const {
   track.no_side_slip_ns = track.doubt_until_ns = 0;
   track.parts = {};
   track.doubt_m.setZero();
+}
+
+void InsTracker::warm_start(InsTrack& track, const WarmState& state) const {
+  Eskf18& filter = track.filter;
+  filter.p_map_m = state.T_map_base.p;
+  filter.q_map_base = state.T_map_base.q;
+  filter.v_map_mps = state.T_map_base.q * state.linear_base_mps;
+  const Matrix3d R = filter.R_map_base();
+  const Matrix3d rotation = R.transpose() * state.rotation_covariance_rad2 * R;
+  // v_map = R v_base: a wrong heading turns the velocity with it, and no wheel sees that.
+  const Matrix3d J = -R * hat(state.linear_base_mps);
+  reset_block(filter, ins::kPosition, state.position_covariance_m2);
+  reset_block(filter, ins::kRotation, rotation);
+  reset_block(filter,
+              ins::kVelocity,
+              R * state.velocity_covariance_m2ps2 * R.transpose() + J * rotation * J.transpose());
+  filter.P.block<3, 3>(ins::kVelocity, ins::kRotation) = J * rotation;
+  filter.P.block<3, 3>(ins::kRotation, ins::kVelocity) = (J * rotation).transpose();
+  track.phase = Phase::kRunning;
+  track.warm_ns = track.stamp_ns;
 }
 
 InsNoise InsTracker::noise(const InsTrack& track) const {

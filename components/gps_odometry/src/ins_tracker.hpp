@@ -8,6 +8,7 @@
 #include "heading.hpp"
 #include "imu_checks.hpp"
 #include "track.hpp"
+#include "warm_start.hpp"
 #include <Eigen/Core>
 
 #include <array>
@@ -55,6 +56,8 @@ class InsTracker {
 
   void apply(InsTrack& track, const CheckedImu& imu) const;
   FixOutcome apply(InsTrack& track, const MapFix& fix) const;
+  /// Goes on from another filter's state; the phase becomes kRunning.
+  void warm_start(InsTrack& track, const WarmState& state) const;
 
   Estimate estimate(const InsTrack& track) const;
 

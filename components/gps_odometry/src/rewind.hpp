@@ -42,6 +42,10 @@ class RewindBuffer {
 
   void change_frame(const Eigen::Matrix3d& R_new_old, const Eigen::Vector3d& t_new_old);
 
+  /// Changes the newest state and forgets the measurements before it.
+  template <typename Change>
+  void replace_newest(const Change& change);
+
   /// Announces a reset of all states alike.
   void announce_reset(const YawPose& delta);
 
@@ -170,6 +174,17 @@ void RewindBuffer<TrackerType>::change_frame(const Eigen::Matrix3d& R_new_old,
       fix->covariance_map_m2 = R_new_old * fix->covariance_map_m2 * R_new_old.transpose();
     }
   }
+}
+
+template <typename TrackerType>
+template <typename Change>
+void RewindBuffer<TrackerType>::replace_newest(const Change& change) {
+  if (entries_.empty()) {
+    return;
+  }
+  change(entries_.back().after);
+  before_ = entries_.back().after;
+  entries_.erase(entries_.begin(), std::prev(entries_.end()));
 }
 
 template <typename TrackerType>

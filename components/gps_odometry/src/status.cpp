@@ -29,10 +29,11 @@ GpsHealth health_of(const Track& track,
   if (around.imu_faulty) {
     return GpsHealth::kFault;
   }
-  if (!around.has_datum || track.phase == Phase::kNoImu || track.accepted_ns == 0) {
+  if (!around.has_datum || track.phase == Phase::kNoImu ||
+      (track.accepted_ns == 0 && !is_unconfirmed(track))) {
     return GpsHealth::kInit;
   }
-  const double age_s = to_seconds(around.now_ns - track.accepted_ns);
+  const double age_s = to_seconds(around.now_ns - std::max(track.accepted_ns, track.warm_ns));
   if (around.imu_silent || age_s > config.stale_after_s) {
     return GpsHealth::kStale;
   }

@@ -42,6 +42,8 @@ struct Track {
   Nanoseconds stamp_ns{0};
   Nanoseconds imu_ns{0};
 
+  Nanoseconds warm_ns{0};  ///< when another filter's odometry was taken over; 0: it was not
+
   // The newest accepted fix: what it left of the antenna's position.
   Nanoseconds accepted_ns{0};
   Eigen::Vector3d accepted_antenna_map_m{Eigen::Vector3d::Constant(kNaN)};
@@ -66,6 +68,11 @@ struct Track {
   std::uint64_t recoveries{0};
   std::uint64_t not_finite{0};  ///< restarts after a step that was not finite
 };
+
+/// Begun from another filter's odometry, and no fix has confirmed it since.
+inline bool is_unconfirmed(const Track& track) {
+  return track.phase == Phase::kRunning && track.warm_ns > 0 && track.accepted_ns <= track.warm_ns;
+}
 
 /// What a fix did; empty reason: accepted without remark.
 struct FixOutcome {

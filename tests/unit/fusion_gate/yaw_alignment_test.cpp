@@ -260,6 +260,51 @@ TEST(YawAlignment, a_tilted_odom_costs_little_height_where_the_robot_is) {
   EXPECT_LT(height_error_m(0.02), 0.5 * unmodelled_m);
 }
 
+/// Pairs of 300 m whose source is a grid with this scale.
+std::vector<AlignmentPair> grid_pairs(double scale) {
+  const Drive drive{100, 1.0, 3.0, 0.02};
+  std::vector<AlignmentPair> pairs = drive_pairs(drive, kTruth);
+  for (AlignmentPair& pair : pairs) {
+    pair.p_odom_m.head<2>() *= scale;
+  }
+  return pairs;
+}
+
+TEST(YawAlignment, finds_the_scale_of_a_grid_when_asked) {
+  AlignmentConfig config;
+  config.lio_drift_m_per_sqrt_m = 0.0;
+  config.lio_tilt_sigma_rad = 0.0;
+  const auto solution = solve_alignment(grid_pairs(0.9996), config, 1.0);  // hardly any prior
+  ASSERT_TRUE(solution);
+  EXPECT_NEAR(solution->scale, 1.0 / 0.9996, 1e-7);
+  EXPECT_NEAR(solution->T_map_odom.yaw_rad, kTruth.yaw_rad, 1e-8);
+  EXPECT_LT((solution->T_map_odom.p - kTruth.p).norm(), 1e-6);
+}
+
+TEST(YawAlignment, leaves_the_scale_at_one_when_not_asked) {
+  const auto solution = solve_alignment(grid_pairs(0.9996), {});
+  ASSERT_TRUE(solution);
+  EXPECT_DOUBLE_EQ(solution->scale, 1.0);
+  EXPECT_EQ(solution->scale_covariance[4], 0.0);
+}
+
+TEST(YawAlignment, predicts_the_error_of_the_scale_with_correlated_errors) {
+  AlignmentConfig config;
+  config.lio_drift_m_per_sqrt_m = 0.0;
+  config.lio_tilt_sigma_rad = 0.0;
+  constexpr unsigned kRuns = 60;
+  double normalised = 0.0;
+  for (unsigned seed = 0; seed < kRuns; ++seed) {
+    std::vector<AlignmentPair> pairs = grid_pairs(0.9996);
+    add_errors(pairs, config, seed);
+    const auto solution = solve_alignment(pairs, config, 1.0);
+    const double error = solution->scale - 1.0 / 0.9996;
+    normalised += error * error / solution->scale_covariance[4] / kRuns;
+  }
+  EXPECT_GT(normalised, 0.5);  // chi-square of 60 degrees of freedom: 0.54 to 1.66 at 99.9 %
+  EXPECT_LT(normalised, 1.66);
+}
+
 TEST(YawAlignment, returns_nothing_without_pairs_or_with_nan) {
   EXPECT_FALSE(solve_alignment({}, {}));
   std::vector<AlignmentPair> pairs = drive_pairs({}, kTruth);

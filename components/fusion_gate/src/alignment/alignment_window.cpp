@@ -17,7 +17,7 @@ bool AlignmentWindow::add(const AlignmentPair& pair) {
 }
 
 void AlignmentWindow::clear() {
-  *this = AlignmentWindow(config_);
+  *this = AlignmentWindow(config_, scale_sigma_);
 }
 
 bool AlignmentWindow::is_redundant(const AlignmentPair& pair) const {
@@ -46,7 +46,7 @@ void AlignmentWindow::bound() {
 }
 
 void AlignmentWindow::solve() {
-  solution_ = solve_alignment(pairs_, config_);
+  solution_ = solve_alignment(pairs_, config_, scale_sigma_);
   obstacle_ = solution_ ? find_obstacle(*solution_, config_)
                         : std::optional<std::string>("no finite solution");
   // A wrong stretch at the start must not block the alignment for as long as it is in the window.
@@ -54,7 +54,7 @@ void AlignmentWindow::solve() {
   while (obstacle_ && pairs_.size() - skipped >= static_cast<std::size_t>(config_.min_pairs)) {
     const std::vector<AlignmentPair> newest(pairs_.begin() + static_cast<std::ptrdiff_t>(skipped),
                                             pairs_.end());
-    const auto candidate = solve_alignment(newest, config_);
+    const auto candidate = solve_alignment(newest, config_, scale_sigma_);
     if (candidate && !find_obstacle(*candidate, config_)) {
       solution_ = candidate;
       obstacle_.reset();

@@ -13,7 +13,8 @@ namespace trigpoint::fusion_gate {
 /// The pairs of the newest stretch, and the alignment that follows from them.
 class AlignmentWindow {
  public:
-  explicit AlignmentWindow(const AlignmentConfig& config) : config_(config) {}
+  explicit AlignmentWindow(const AlignmentConfig& config, double scale_sigma = 0.0)
+      : config_(config), scale_sigma_(scale_sigma) {}
 
   /// Adds and solves. False when the pair says nothing new (too near to the last one, too soon, or
   /// not newer than it).
@@ -35,6 +36,7 @@ class AlignmentWindow {
   void solve();
 
   AlignmentConfig config_;
+  double scale_sigma_;
   std::vector<AlignmentPair> pairs_;
   double spacing_factor_{1.0};
   std::optional<AlignmentSolution> solution_;

@@ -69,8 +69,25 @@ YawPose closed_form(const std::vector<AlignmentPair>& pairs, const Weights& weig
   return {yaw_rad, mean_map - from_yaw(yaw_rad) * mean_odom};
 }
 
+using Vector5d = Eigen::Matrix<double, 5, 1>;
+using Matrix5d = Eigen::Matrix<double, 5, 5>;
+
+/// What is solved for: a grid's scale concerns east and north only.
+struct ScaledPose {
+  YawPose T;
+  double scale{1.0};
+
+  Eigen::Vector3d scaled(const Eigen::Vector3d& p_odom_m) const {
+    return {scale * p_odom_m.x(), scale * p_odom_m.y(), p_odom_m.z()};
+  }
+};
+
 Eigen::Vector3d residual_of(const AlignmentPair& pair, const Pose& T_map_odom) {
   return pair.p_map_m - T_map_odom * pair.p_odom_m;
+}
+
+Eigen::Vector3d residual_of(const AlignmentPair& pair, const ScaledPose& estimate) {
+  return pair.p_map_m - estimate.T.pose() * estimate.scaled(pair.p_odom_m);
 }
 
 /// A start that a few wild fixes cannot turn: weights from the residuals' own median.
@@ -142,9 +159,10 @@ Covariances residual_covariances(const std::vector<AlignmentPair>& pairs,
   return covariances;
 }
 
+/// Order yaw, x, y, z, scale.
 struct Linearised {
-  Eigen::Matrix4d information{Eigen::Matrix4d::Zero()};
-  Eigen::Vector4d gradient{Eigen::Vector4d::Zero()};
+  Matrix5d information{Matrix5d::Zero()};
+  Vector5d gradient{Vector5d::Zero()};
   double chi_square{0.0};
 };
 
@@ -154,13 +172,12 @@ struct RobustWeights {
 };
 
 RobustWeights weigh(const std::vector<AlignmentPair>& pairs,
-                    const YawPose& estimate,
+                    const ScaledPose& estimate,
                     const Covariances& covariances) {
   const auto n = static_cast<Eigen::Index>(pairs.size());
   RobustWeights weights{Weights(n), Weights(n)};
-  const Pose T_map_odom = estimate.pose();
   for (Eigen::Index k = 0; k < n; ++k) {
-    const Eigen::Vector3d r = residual_of(pairs[static_cast<std::size_t>(k)], T_map_odom);
+    const Eigen::Vector3d r = residual_of(pairs[static_cast<std::size_t>(k)], estimate);
     const Eigen::Vector3d variance_m2(
         covariances[0](k, k), covariances[1](k, k), covariances[2](k, k));
     const Eigen::Vector3d squared_sigmas = r.cwiseAbs2().cwiseQuotient(variance_m2);
@@ -173,29 +190,38 @@ RobustWeights weigh(const std::vector<AlignmentPair>& pairs,
 using Factor = Eigen::LLT<Eigen::MatrixXd>;
 
 Linearised linearise(const std::vector<AlignmentPair>& pairs,
-                     const YawPose& estimate,
+                     const ScaledPose& estimate,
+                     double scale_sigma,
                      const std::array<Factor, 3>& factors) {
   const auto n = static_cast<Eigen::Index>(pairs.size());
-  const Pose T_map_odom = estimate.pose();
+  const Eigen::Quaterniond q_map_odom = estimate.T.pose().q;
   Linearised result;
   for (int axis = 0; axis < 3; ++axis) {
     Eigen::VectorXd r(n);
-    Eigen::MatrixX4d jacobian = Eigen::MatrixX4d::Zero(n, 4);  // of the prediction: yaw, x, y, z
+    Eigen::Matrix<double, Eigen::Dynamic, 5> jacobian =  // of the prediction
+        Eigen::Matrix<double, Eigen::Dynamic, 5>::Zero(n, 5);
     for (Eigen::Index k = 0; k < n; ++k) {
       const AlignmentPair& pair = pairs[static_cast<std::size_t>(k)];
-      const Eigen::Vector3d turned = T_map_odom.q * pair.p_odom_m;
-      r[k] = residual_of(pair, T_map_odom)[axis];
+      const Eigen::Vector3d turned = q_map_odom * estimate.scaled(pair.p_odom_m);
+      r[k] = residual_of(pair, estimate)[axis];
       jacobian(k, 0) = Eigen::Vector3d::UnitZ().cross(turned)[axis];
       jacobian(k, 1 + axis) = 1.0;
+      if (scale_sigma > 0.0 && axis < 2) {
+        jacobian(k, 4) = turned[axis] / estimate.scale;
+      }
     }
     const Factor& factor = factors[static_cast<std::size_t>(axis)];
-    const Eigen::MatrixX4d whitened = factor.matrixL().solve(jacobian);
+    const Eigen::Matrix<double, Eigen::Dynamic, 5> whitened = factor.matrixL().solve(jacobian);
     const Eigen::VectorXd whitened_r = factor.matrixL().solve(r);
     result.information += whitened.transpose() * whitened;
     result.gradient += whitened.transpose() * whitened_r;
     result.chi_square += whitened_r.squaredNorm();
   }
   result.information(0, 0) += kYawPriorInformation;
+  // The prior, or for a scale that is not asked for a unit row that leaves it at 1.
+  const double scale_information = scale_sigma > 0.0 ? 1.0 / (scale_sigma * scale_sigma) : 1.0;
+  result.information(4, 4) += scale_information;
+  result.gradient[4] -= scale_information * (estimate.scale - 1.0);
   return result;
 }
 
@@ -242,34 +268,41 @@ double AlignmentSolution::yaw_sigma_rad() const {
 }
 
 std::optional<AlignmentSolution> solve_alignment(const std::vector<AlignmentPair>& pairs,
-                                                 const AlignmentConfig& config) {
+                                                 const AlignmentConfig& config,
+                                                 double scale_sigma) {
   if (pairs.empty()) {
     return std::nullopt;
   }
   const Covariances covariances = residual_covariances(pairs, config);
-  YawPose estimate = robust_closed_form(pairs);
+  ScaledPose estimate{robust_closed_form(pairs)};
   Linearised system;
   RobustWeights weights;
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
     weights = weigh(pairs, estimate, covariances);
-    system = linearise(pairs, estimate, factorise(covariances, weights));
-    const Eigen::Vector4d step = system.information.ldlt().solve(system.gradient);
-    estimate = {wrap_angle(estimate.yaw_rad + step[0]), estimate.p + step.tail<3>()};
+    system = linearise(pairs, estimate, scale_sigma, factorise(covariances, weights));
+    const Vector5d step = system.information.ldlt().solve(system.gradient);
+    estimate = {{wrap_angle(estimate.T.yaw_rad + step[0]), estimate.T.p + step.segment<3>(1)},
+                estimate.scale + step[4]};
     if (!step.allFinite() || step.norm() < kConverged) {
       break;
     }
   }
   AlignmentSolution solution;
-  solution.T_map_odom = estimate;
+  solution.T_map_odom = estimate.T;
+  solution.scale = estimate.scale;
   solution.pairs = pairs.size();
   solution.baseline_m = horizontal_extent(pairs);
   const double dof = std::max(1.0, 3.0 * static_cast<double>(pairs.size()) - 4.0);
   solution.chi_square = system.chi_square;
   solution.chi_square_limit = config.residual_tolerance * chi_square_quantile(dof);
   solution.outlier_share = outlier_share_of(weights);
-  solution.covariance = system.information.ldlt().solve(Eigen::Matrix4d::Identity()) *
-                        std::max(1.0, system.chi_square / dof);
-  const bool finite = estimate.pose().is_finite() && solution.covariance.allFinite();
+  const Matrix5d covariance = system.information.ldlt().solve(Matrix5d::Identity()) *
+                              std::max(1.0, system.chi_square / dof);
+  solution.covariance = covariance.topLeftCorner<4, 4>();
+  if (scale_sigma > 0.0) {
+    solution.scale_covariance = covariance.col(4);
+  }
+  const bool finite = estimate.T.pose().is_finite() && covariance.allFinite();
   return finite ? std::optional(solution) : std::nullopt;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
-// The 4-DoF transform (yaw, x, y, z) between two level frames from matched positions.
+// The 4-DoF transform (yaw, x, y, z) between two level frames from matched positions, and where the
+// source is a grid (UTM) its horizontal scale.
 #pragma once
 
 #include "trigpoint/base/pose.hpp"
@@ -27,8 +28,11 @@ struct AlignmentPair {
 struct AlignmentSolution {
   YawPose T_map_odom;          ///< as of the newest pair
   Eigen::Matrix4d covariance;  ///< yaw, x, y, z; already scaled by max(1, chi_square / dof)
-  double baseline_m{0.0};      ///< horizontal extent of the pairs
-  double chi_square{0.0};      ///< of the residuals, correlations included
+  double scale{1.0};           ///< p_map = T_map_odom (scale x, scale y, z)
+  /// Of the scale: with yaw, x, y, z, and its variance.
+  Eigen::Matrix<double, 5, 1> scale_covariance{Eigen::Matrix<double, 5, 1>::Zero()};
+  double baseline_m{0.0};  ///< horizontal extent of the pairs
+  double chi_square{0.0};  ///< of the residuals, correlations included
   double chi_square_limit{0.0};
   double outlier_share{0.0};
   std::size_t pairs{0};
@@ -38,9 +42,11 @@ struct AlignmentSolution {
 
 /// Robust generalised least squares (README, "Alignment"); nullopt without pairs or when nothing
 /// finite comes out. Pairs in the order of their stamps. A single pair gives a solution too, with
-/// a yaw sigma that says that yaw is not known.
+/// a yaw sigma that says that yaw is not known. `scale_sigma`: prior of the scale about 1; 0: it is
+/// 1 (a LiDAR measures true distances).
 std::optional<AlignmentSolution> solve_alignment(const std::vector<AlignmentPair>& pairs,
-                                                 const AlignmentConfig& config);
+                                                 const AlignmentConfig& config,
+                                                 double scale_sigma = 0.0);
 
 /// Why the solution must not be used yet, as a sentence; nullopt when it may.
 std::optional<std::string> find_obstacle(const AlignmentSolution& solution,

@@ -15,8 +15,9 @@
 namespace trigpoint::fusion_gate {
 
 /// A GPS filter that publishes plain Odometry and no GpsStatus: its frame may start at its own
-/// first fix and be turned. Yaw and offset are estimated against the raw fixes in map, and each raw
-/// fix then yields one accepted fix: the filter's antenna at that stamp, in map.
+/// first fix, be turned, and have a grid's scale (UTM). Yaw, offset and scale are estimated against
+/// the raw fixes in map, and each raw fix then yields one accepted fix: the filter's antenna at
+/// that stamp, in map.
 class ForeignSource {
  public:
   ForeignSource(const Config& config, const Eigen::Vector3d& antenna_position_base_m);
@@ -33,9 +34,14 @@ class ForeignSource {
 
  private:
   std::vector<AcceptedFix> match();
+  Odometry from_own_origin(const Odometry& odometry) const;
+  Odometry brought_into_map(const Odometry& from_own_origin) const;
   std::optional<AcceptedFix> add_pair(const AcceptedFix& fix, const PoseBuffer::Sample& at_fix);
 
   Eigen::Vector3d lever_arm_base_m_;
+  /// The first position that was heard: raw UTM coordinates would be thousands of kilometres away
+  /// from their own origin.
+  std::optional<Eigen::Vector3d> origin_m_;
   PoseBuffer poses_;
   AlignmentWindow window_;
   std::deque<AcceptedFix> pending_;

@@ -30,8 +30,9 @@ inline constexpr Topic<nav_msgs::msg::Odometry> gps_odometry{"gps/odometry",
                                                              qos::kDefault.with_depth(200)};
 inline constexpr Topic<trigpoint_msgs::msg::GpsStatus> gps_status{"gps/status",
                                                                   qos::kDefault.with_depth(100)};
+/// Latched: a filter that starts after another one's death finds there where that one was.
 inline constexpr Topic<nav_msgs::msg::Odometry> gps_selected{"gps/selected",
-                                                             qos::kDefault.with_depth(200)};
+                                                             qos::kTransientLocal.with_depth(200)};
 inline constexpr Topic<nav_msgs::msg::Odometry> lio_odometry{"lio/odometry",
                                                              qos::kDefault.with_depth(200)};
 inline constexpr Topic<nav_msgs::msg::Odometry> lio_odometry_imu_rate{

@@ -10,6 +10,7 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 namespace trigpoint::gps_odometry {
@@ -37,6 +38,12 @@ class GpsOdometry {
   /// Adopts a datum that somebody else elected (or configuration gave); an older election replaces
   /// the present one and is announced as a reset.
   Output on_datum(const Datum& datum);
+
+  /// Warm start: another filter's gps/odometry, about the datum `datum_id`. A freshly started
+  /// filter begins there, inflated, when it hears one no later than a second after its first usable
+  /// IMU sample; afterwards this does nothing.
+  Output on_odometry(const Odometry& odometry, const std::string& datum_id);
+  bool wants_odometry() const;
 
   std::optional<Datum> datum() const;
 

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#pragma once
+
+#include "trigpoint/base/messages.hpp"
+
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+
+namespace trigpoint::gps_odometry {
+
+/// What other programs on the bus say of where the vehicle is, joined with the datum that they name
+/// elsewhere (gps/status of a filter, `datum` of the gate). Told apart by participant: the first 24
+/// hexadecimal digits of a writer's GUID.
+class OtherFilters {
+ public:
+  struct Heard {
+    Odometry odometry;
+    std::string datum_id;
+  };
+
+  static std::string participant_of(const std::string& writer_guid) {
+    return writer_guid.substr(0, 24);
+  }
+
+  std::optional<Heard> on_odometry(const std::string& writer_guid, Odometry odometry) {
+    Said& said = said_[participant_of(writer_guid)];
+    said.odometry = std::move(odometry);
+    return joined(said);
+  }
+
+  std::optional<Heard> on_datum_id(const std::string& writer_guid, const std::string& id) {
+    Said& said = said_[participant_of(writer_guid)];
+    said.datum_id = id;
+    return joined(said);
+  }
+
+ private:
+  struct Said {
+    std::optional<Odometry> odometry;
+    std::string datum_id;
+  };
+
+  static std::optional<Heard> joined(const Said& said) {
+    if (!said.odometry || said.datum_id.empty()) {
+      return std::nullopt;
+    }
+    return Heard{*said.odometry, said.datum_id};
+  }
+
+  std::map<std::string, Said> said_;
+};
+
+}  // namespace trigpoint::gps_odometry
