@@ -2,8 +2,6 @@
 // Copyright the Trigpoint developers
 #include "bus_guard.hpp"
 
-#include "trigpoint/bus/topics.hpp"
-
 #include "bus_survey.hpp"
 #include "known_topics.hpp"
 
@@ -12,28 +10,29 @@
 #include <filesystem>
 #include <fstream>
 #include <set>
+#include <stdexcept>
 
 namespace trigpoint::cli {
 
 namespace {
 
 namespace fs = std::filesystem;
-namespace topics = bus::topics;
 
 // Processes on one computer find each other within about 0.2 s; the rest is for a loaded one.
 constexpr double kListen_s = 1.5;
 
 std::vector<recording::KnownTopic> guarded_topics(const RobotConfig& robot, Guarded guarded) {
   std::set<std::string> names{robot.points_topic, robot.imu_topic, robot.fix_topic};
-  names.emplace(topics::clock.name);
+  names.insert("clock");
   if (guarded == Guarded::kSensorsAndCores) {
-    names.emplace(topics::gps_odometry.name);
-    names.emplace(topics::lio_odometry.name);
-    names.emplace(topics::fusion_odometry.name);
+    names.insert({"gps/odometry", "lio/odometry", "fusion/odometry"});
   }
-  std::vector<recording::KnownTopic> all = recording::known_topics(robot);
-  std::erase_if(all, [&names](const auto& topic) { return !names.contains(topic.name); });
-  return all;
+  std::vector<recording::KnownTopic> guards = recording::known_topics(robot);
+  std::erase_if(guards, [&names](const auto& topic) { return !names.contains(topic.name); });
+  if (guards.size() != names.size()) {
+    throw std::logic_error("a guarded topic is not among the known ones");
+  }
+  return guards;
 }
 
 /// The name of the program that process `number` runs; empty when there is none to be read.

@@ -66,8 +66,4 @@ int finish_session(const std::string& session) {
   return report.complete && report.failures.empty() ? 0 : 1;
 }
 
-std::string mode_of(const SystemConfig& config) {
-  return config.cores.fusion_gate.mode;
-}
-
 }  // namespace trigpoint::cli

@@ -7,7 +7,6 @@
 #include "trigpoint/simulator/scenario.hpp"
 #include "trigpoint/simulator/simulator.hpp"
 
-#include "finish_session.hpp"
 #include "number_checks.hpp"
 
 #include <algorithm>

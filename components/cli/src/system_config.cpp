@@ -48,6 +48,10 @@ void describe(SystemConfig& config, ConfigFields& fields) {
       "log", "which part of a log is used", [&](ConfigFields& f) { describe_log(config.log, f); });
 }
 
+std::string mode_of(const SystemConfig& config) {
+  return config.cores.fusion_gate.mode;
+}
+
 void load(SystemConfig& config, const std::vector<std::string>& files) {
   load_config(files, [&config](ConfigFields& fields) { describe(config, fields); });
 }

@@ -20,6 +20,9 @@ struct SystemConfig {
   recording::LogOptions log;
 };
 
+/// The gate's mode that a configuration names.
+std::string mode_of(const SystemConfig& config);
+
 void describe(SystemConfig& config, ConfigFields& fields);
 
 /// Throws ConfigError with file, line, key and rule.
