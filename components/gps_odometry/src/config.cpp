@@ -14,9 +14,9 @@ void describe_output(Config& c, ConfigFields& f) {
   f.choice(
       "filter",
       c.filter,
-      "The filter of an offline run: ekf15 (the paper's states) or eskf18 (error-state INS). On "
-      "the bus each is a program of its own",
-      {"ekf15", "eskf18"});
+      "The filter of an offline run: ekf15 (the paper's states) or eskf18 (error-state INS); on "
+      "the bus each is a program of its own. ekf15_strict is the published filter, to compare with",
+      {"ekf15", "eskf18", "ekf15_strict"});
   f.number("publish_rate_hz", c.publish_rate_hz, "Highest rate of gps/odometry (Hz)", kPositive);
   f.number("dead_reckoning_after_s",
            c.dead_reckoning_after_s,

@@ -7,6 +7,7 @@
 #include "ekf_tracker.hpp"
 #include "ins_tracker.hpp"
 #include "rewind.hpp"
+#include "strict_filter.hpp"
 
 namespace trigpoint::gps_odometry {
 
@@ -73,8 +74,11 @@ std::unique_ptr<Filter> make_filter(const Config& config, const RobotConfig& rob
   if (config.filter == InsTracker::kSource) {
     return std::make_unique<BufferedFilter<InsTracker>>(config, robot);
   }
+  if (config.filter == StrictFilter::kSource) {
+    return std::make_unique<StrictFilter>(config, robot);
+  }
   throw ConfigError("gps_odometry: there is no filter '" + config.filter +
-                    "', expected ekf15 or eskf18.");
+                    "', expected ekf15, eskf18 or ekf15_strict.");
 }
 
 }  // namespace trigpoint::gps_odometry

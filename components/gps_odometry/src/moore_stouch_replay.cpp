@@ -86,6 +86,14 @@ void MooreStouchReplay::add(const TwistSample& sample, const MeasuredStates& mea
   enqueue(Kind::kTwist, sample.stamp_ns, twist);
 }
 
+void MooreStouchReplay::add(const PositionSample& sample) {
+  Measurement position;
+  position.z.segment<3>(kPosition) = sample.position_m;
+  position.R.block<3, 3>(kPosition, kPosition) = sample.covariance_m2;
+  position.measured = MeasuredStates{0b111} << kPosition;
+  enqueue(Kind::kPosition, sample.stamp_ns, position);
+}
+
 void MooreStouchReplay::enqueue(Kind kind, Nanoseconds stamp_ns, const Measurement& measurement) {
   if (measurement.measured.none()) {
     return;

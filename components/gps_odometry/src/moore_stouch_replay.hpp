@@ -33,6 +33,13 @@ struct TwistSample {
   Eigen::Matrix<double, 6, 6> covariance{Eigen::Matrix<double, 6, 6>::Zero()};
 };
 
+/// A position of base_link in the world frame: a fix, its covariance copied as it is.
+struct PositionSample {
+  Nanoseconds stamp_ns{0};
+  Eigen::Vector3d position_m{Eigen::Vector3d::Zero()};
+  Eigen::Matrix3d covariance_m2{Eigen::Matrix3d::Zero()};
+};
+
 /// `measured` names states of the filter; rates and accelerations are chosen in the IMU's axes and
 /// turned with them.
 struct ImuUse {
@@ -48,6 +55,7 @@ class MooreStouchReplay {
   /// kind is dropped, one with the same stamp is not.
   void add(const AhrsSample& sample, const ImuUse& use);
   void add(const TwistSample& sample, const MeasuredStates& measured);
+  void add(const PositionSample& sample);
 
   /// One tick of the filter's timer: fuses what waits with a stamp up to now, in order of the
   /// stamps. A stamp before the filter's own time is fused into the present state. When nothing
@@ -55,6 +63,12 @@ class MooreStouchReplay {
   void tick(Nanoseconds now_ns);
 
   const MooreStouch& filter() const { return filter_; }
+
+  /// To move the state into another frame.
+  MooreStouch& filter() { return filter_; }
+
+  /// What the state is of.
+  Nanoseconds stamp_ns() const { return filter_ns_; }
 
   int late_measurements() const { return late_measurements_; }
 
@@ -65,7 +79,7 @@ class MooreStouchReplay {
     MeasuredStates measured;
   };
 
-  enum class Kind { kAttitude, kRate, kAcceleration, kTwist };
+  enum class Kind { kAttitude, kRate, kAcceleration, kTwist, kPosition };
 
   void enqueue(Kind kind, Nanoseconds stamp_ns, const Measurement& measurement);
   void fuse(Nanoseconds stamp_ns, const Measurement& measurement);
