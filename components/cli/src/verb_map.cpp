@@ -47,18 +47,29 @@ int run(const MapOptions& options) {
   Input input =
       open_input(options.input, exporter::path_in(options.out, exporter::session_file::kTruth));
   Progress progress("mapping");
+  std::string refused_imu;
+  const auto on_event = [&](const Event& event) {
+    log(event);
+    if (event.code == "imu_gyro_in_degrees") {
+      refused_imu = event.text;
+    }
+  };
   const pipeline::MapLogResult result = pipeline::map_log(*input.reader,
                                                           input.config.cores,
                                                           {options.out,
                                                            print(input.config),
                                                            mode_of(input.config),
                                                            [&](double share) { progress(share); },
-                                                           [&](const Event& event) { log(event); },
+                                                           on_event,
                                                            [&] { return stop.requested(); }});
   const int finished = finish_session(options.out);
   std::cout << result.sweeps_used << " of " << result.sweeps_in_log << " sweeps used, "
             << result.data_s << " s of data in " << result.wall_s << " s ("
             << result.data_s / std::max(result.wall_s, 1e-9) << " x real time)\n";
+  if (!refused_imu.empty()) {
+    std::cerr << "trigpoint map: " << refused_imu << ". What came before is of no use either\n";
+    return 1;
+  }
   return std::max(exit_code_of(result), finished);
 }
 
