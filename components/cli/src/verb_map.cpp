@@ -42,10 +42,16 @@ int exit_code_of(const pipeline::MapLogResult& result) {
   return 0;
 }
 
-pipeline::MapLogResult map(const MapOptions& options) {
+/// `refused_imu` becomes the sentence of an IMU that was refused for good while it ran.
+pipeline::MapLogResult map(const MapOptions& options, std::string& refused_imu) {
   const shell::StopSignal stop;
   const shell::EventLog log("map");
-  ToldOnce events([&log](const Event& event) { log(event); });
+  ToldOnce events([&](const Event& event) {
+    log(event);
+    if (event.code == "imu_gyro_in_degrees") {
+      refused_imu = event.text;
+    }
+  });
   Input input =
       open_input(options.input, exporter::path_in(options.out, exporter::session_file::kTruth));
   pipeline::MapLogResult result;
@@ -66,7 +72,8 @@ pipeline::MapLogResult map(const MapOptions& options) {
 
 int run(const MapOptions& options) {
   refuse_used_folder(options.out);
-  const pipeline::MapLogResult result = map(options);
+  std::string refused_imu;
+  const pipeline::MapLogResult result = map(options, refused_imu);
   if (result.stopped) {
     std::cerr << "trigpoint map: interrupted after " << result.data_s
               << " s of the log; what was done so far is kept in " << options.out
@@ -80,6 +87,10 @@ int run(const MapOptions& options) {
   std::cout << result.sweeps_used << " of " << result.sweeps_in_log << " sweeps used, "
             << result.data_s << " s of data in " << result.wall_s << " s ("
             << result.data_s / std::max(result.wall_s, 1e-9) << " x real time)\n";
+  if (!refused_imu.empty()) {
+    std::cerr << "trigpoint map: " << refused_imu << ". What came before is of no use either\n";
+    return 1;
+  }
   return std::max(exit_code_of(result), finished);
 }
 

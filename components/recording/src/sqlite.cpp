@@ -4,7 +4,19 @@
 
 namespace trigpoint::recording {
 
-Database::Database(const std::string& file, int flags) : file_(file) {
+namespace {
+
+/// The file of an SQLite URI as a user knows it: "file:NAME?immutable=1" is NAME.
+std::string plain_name(const std::string& file) {
+  constexpr char kScheme[] = "file:";
+  return file.starts_with(kScheme)
+             ? file.substr(sizeof(kScheme) - 1, file.rfind('?') - (sizeof(kScheme) - 1))
+             : file;
+}
+
+}  // namespace
+
+Database::Database(const std::string& file, int flags) : file_(plain_name(file)) {
   sqlite3* handle = nullptr;
   const int result = sqlite3_open_v2(file.c_str(), &handle, flags, nullptr);
   handle_.reset(handle);
