@@ -39,6 +39,9 @@ class StrictFilter : public Filter {
   void change_frame(const Eigen::Matrix3d& R_new_old, const Eigen::Vector3d& t_new_old) override;
   void announce_reset(const YawPose& delta) override;
 
+  /// Offline there is no other filter to begin from: it begins by itself.
+  void warm_start(const WarmState&) override {}
+
   const Track& newest() const override { return track_; }
 
   Estimate estimate() const override;
