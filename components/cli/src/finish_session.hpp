@@ -2,7 +2,6 @@
 // Copyright the Trigpoint developers
 #pragma once
 
-
 #include <string>
 
 namespace trigpoint::cli {
