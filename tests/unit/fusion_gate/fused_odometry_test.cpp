@@ -142,5 +142,27 @@ TEST(FusedOdometry, admits_the_lever_arm_as_an_error_where_the_heading_is_unknow
   EXPECT_NEAR(base.pose_covariance(0, 0), 4.01, 1e-12);
 }
 
+TEST(FusedOdometry, carries_the_tilt_of_odom_to_the_robot_as_numerical_differences_say) {
+  Odometry lio;
+  lio.T_frame_child.p = {40.0, -25.0, 3.0};
+  lio.pose_covariance.setZero();
+  const YawPose T{0.7, {5.0, 6.0, 7.0}, {0.01, -0.02}};
+  for (int axis = 0; axis < 2; ++axis) {
+    Matrix6d covariance = Matrix6d::Zero();
+    covariance(4 + axis, 4 + axis) = 1.0;
+    YawPose plus = T;
+    YawPose minus = T;
+    plus.tilt_rad[axis] += kStep;
+    minus.tilt_rad[axis] -= kStep;
+    const Pose a = plus.pose() * lio.T_frame_child;
+    const Pose b = minus.pose() * lio.T_frame_child;
+    Eigen::Matrix<double, 6, 1> column;
+    column << (a.p - b.p) / (2.0 * kStep), so3_log(a.q * b.q.conjugate()) / (2.0 * kStep);
+    const Matrix6d difference =
+        fuse(lio, T, covariance).pose_covariance - column * column.transpose();
+    EXPECT_LT(difference.norm(), 1e-4) << "tilt axis " << axis;
+  }
+}
+
 }  // namespace
 }  // namespace trigpoint::fusion_gate

@@ -27,14 +27,13 @@ Odometry fuse(const Odometry& odometry, const YawPose& T_map_odom, const Matrix6
 
   const Eigen::Vector3d& p_odom_m = odometry.T_frame_child.p;
   const Eigen::Vector3d tilt{T_map_odom.tilt_rad.x(), T_map_odom.tilt_rad.y(), 0.0};
-  const Eigen::Matrix3d by_tilt = R_map_odom * so3_right_jacobian(tilt);
+  const Eigen::Matrix3d J_tilt = so3_right_jacobian(tilt);
   Matrix6d by_transform = Matrix6d::Zero();
   by_transform.block<3, 1>(0, 0) = Eigen::Vector3d::UnitZ().cross(R_map_odom * p_odom_m);
   by_transform.block<3, 3>(0, 1) = Eigen::Matrix3d::Identity();
-  by_transform.block<3, 2>(0, 4) =
-      -(R_map_odom * hat(p_odom_m) * so3_right_jacobian(tilt)).leftCols<2>();
+  by_transform.block<3, 2>(0, 4) = -(R_map_odom * hat(p_odom_m) * J_tilt).leftCols<2>();
   by_transform(5, 0) = 1.0;
-  by_transform.block<3, 2>(3, 4) = by_tilt.leftCols<2>();
+  by_transform.block<3, 2>(3, 4) = (R_map_odom * J_tilt).leftCols<2>();
 
   fused.pose_covariance = by_pose * odometry.pose_covariance * by_pose.transpose() +
                           by_transform * T_covariance * by_transform.transpose();
