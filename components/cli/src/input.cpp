@@ -148,7 +148,8 @@ std::unique_ptr<recording::LogReader> open_recorded(const std::string& log,
 }
 
 Input open_scenario(const InputOptions& options, const std::string& truth_file) {
-  const simulator::Scenario scenario = simulator::load_scenario(options.log);
+  const simulator::Scenario scenario =
+      simulator::load_scenario(with_changes(options.log, options.changes));
   const std::optional<double> duration_s = scenario_duration_s(options.duration_s);
   Input input;
   input.config = configure(options, {scenario.robot, scenario.datum});
@@ -215,14 +216,41 @@ void add_input_options(CLI::App& verb, InputOptions& options) {
   verb.add_option("LOG",
                   options.log,
                   "ROS 1 bag, rosbag2 folder, KITTI raw drive folder, folder made by trigpoint "
-                  "simulate, or a scenario (name or .yaml), which is streamed")
+                  "simulate, or a scenario (name or .yaml), which is streamed; "
+                  "SCENARIO+CHANGE+... alters it (see trigpoint simulate --help)")
       ->required();
   add_config_options(verb, options);
   verb.add_option(
           "--seed", options.seed, "of the world and the noise, when LOG is a scenario (default 1)")
       ->check(whole_number());
+  add_scenario_options(verb, options.changes);
   verb.add_option("--duration", options.duration_s, "use only this much of the log, s")
       ->check(more_than_zero());
+}
+
+void add_scenario_options(CLI::App& verb, ScenarioChanges& changes) {
+  verb.add_option("--beams", changes.beams, "of a scenario's LiDAR: 16, 32 or 64")
+      ->check(CLI::IsMember({16, 32, 64}));
+  verb.add_option("--start", changes.start_m, "along a scenario's route: where the drive begins, m")
+      ->check(CLI::NonNegativeNumber);
+  verb.add_option("--day",
+                  changes.day,
+                  "of a scenario: the same world (with the same seed), other noise, later stamps")
+      ->check(whole_number());
+}
+
+std::string with_changes(const std::string& scenario, const ScenarioChanges& changes) {
+  std::string composed = scenario;
+  if (changes.beams != 0) {
+    composed += "+beams_" + std::to_string(changes.beams);
+  }
+  if (changes.start_m) {
+    composed += "+motion.start_m=" + std::to_string(*changes.start_m);
+  }
+  if (changes.day) {
+    composed += "+day=" + std::to_string(*changes.day);
+  }
+  return composed;
 }
 
 Input open_input(const InputOptions& given, const std::string& truth_file) {
@@ -240,6 +268,10 @@ Input open_input(const InputOptions& given, const std::string& truth_file) {
   }
   if (options.seed) {
     throw ConfigError("--seed: " + options.log + " is a recorded drive; only a scenario has one");
+  }
+  if (options.changes.any()) {
+    throw ConfigError("--beams, --start, --day: " + options.log +
+                      " is a recorded drive; only a scenario has them");
   }
   Input input = open_recording(options);
   check_cores(input.config);
@@ -275,12 +307,24 @@ void refuse_used_folder(const std::string& out) {
   }
 }
 
-std::string known_scenarios() {
-  std::string names;
-  for (const std::string& name : simulator::shipped_scenarios()) {
-    names += (names.empty() ? "" : ", ") + name;
+namespace {
+
+std::string listed(const std::vector<std::string>& names) {
+  std::string list;
+  for (const std::string& name : names) {
+    list += (list.empty() ? "" : ", ") + name;
   }
-  return names;
+  return list;
+}
+
+}  // namespace
+
+std::string known_scenarios() {
+  return listed(simulator::shipped_scenarios());
+}
+
+std::string known_scenario_changes() {
+  return listed(simulator::shipped_overlays());
 }
 
 void require_scenario(const std::string& file_or_name) {

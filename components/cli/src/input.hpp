@@ -15,11 +15,21 @@
 
 namespace trigpoint::cli {
 
+/// What the command line changes in a scenario, beside the changes behind its name.
+struct ScenarioChanges {
+  std::int64_t beams{0};  ///< of the LiDAR; 0: the scenario's
+  std::optional<double> start_m;
+  std::optional<std::int64_t> day;
+
+  bool any() const { return beams != 0 || start_m || day; }
+};
+
 struct InputOptions {
   std::string log;  ///< bag, rosbag2, KITTI drive, simulated drive's folder, or scenario
   std::vector<std::string> config_files;
   std::string mode;                   ///< of the gate; empty: the configuration's
   std::optional<std::uint64_t> seed;  ///< of a scenario; 1 when left out
+  ScenarioChanges changes;            ///< of a scenario
   double duration_s{0.0};             ///< 0: all
   bool lenient{false};                ///< a log that lacks a topic is opened all the same
 };
@@ -30,6 +40,12 @@ struct Input {
   std::unique_ptr<recording::LogReader> reader;
   SystemConfig config;
 };
+
+/// The arguments --beams, --start and --day.
+void add_scenario_options(CLI::App& verb, ScenarioChanges& changes);
+
+/// The scenario with the changes behind a plus, as load_scenario takes it.
+std::string with_changes(const std::string& scenario, const ScenarioChanges& changes);
 
 /// The arguments LOG, --config, --mode, --seed and --duration.
 void add_input_options(CLI::App& verb, InputOptions& options);
@@ -50,8 +66,9 @@ SystemConfig load_config_of(const InputOptions& options);
 /// overwritten or mixed with them: a session, a simulated drive, a log.
 void refuse_used_folder(const std::string& out);
 
-/// "campus, short, ..."
+/// "campus, short, ..."; and the changes behind a plus.
 std::string known_scenarios();
+std::string known_scenario_changes();
 
 /// Throws ConfigError that lists the scenarios when there is none of that name.
 void require_scenario(const std::string& file_or_name);

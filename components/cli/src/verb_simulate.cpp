@@ -25,6 +25,7 @@ struct SimulateOptions {
   double duration_s{0.0};
   std::string out;
   bool no_lidar{false};
+  ScenarioChanges changes;
 };
 
 /// Thrown out of the simulation between two messages: the log is closed on the way.
@@ -43,7 +44,7 @@ void simulate(const SimulateOptions& options,
   };
   try {
     simulator::simulate(
-        scenario, options.seed, duration_s, options.out, tell_or_stop, {!options.no_lidar});
+        scenario, options.seed, duration_s, options.out, tell_or_stop, {!options.no_lidar, {}});
   } catch (const std::exception&) {
     std::error_code not_empty;
     std::filesystem::remove(options.out, not_empty);  // leaves whatever is in it
@@ -53,7 +54,8 @@ void simulate(const SimulateOptions& options,
 
 int run(const SimulateOptions& options) {
   require_scenario(options.scenario);
-  const simulator::Scenario scenario = simulator::load_scenario(options.scenario);
+  const simulator::Scenario scenario =
+      simulator::load_scenario(with_changes(options.scenario, options.changes));
   const std::optional<double> duration_s = scenario_duration_s(options.duration_s);
   refuse_used_folder(options.out);
   refuse_used_folder((std::filesystem::path(options.out) / "log").string());
@@ -75,11 +77,18 @@ void add_simulate(CLI::App& app, Chosen& chosen) {
   CLI::App* verb =
       app.add_subcommand("simulate", "Write the log of a drive through a world that is known");
   const auto options = std::make_shared<SimulateOptions>();
-  verb->add_option("SCENARIO", options->scenario, "a .yaml file, or one of: " + known_scenarios())
+  verb->add_option(
+          "SCENARIO",
+          options->scenario,
+          "a .yaml file, or one of: " + known_scenarios() +
+              "; SCENARIO+CHANGE+... alters it, as in campus+beams_64+motion.start_m=50: a "
+              "CHANGE is a .yaml file, KEY=VALUE, or one of: " +
+              known_scenario_changes())
       ->required();
   verb->add_option("--seed", options->seed, "of the world and of the noise")
       ->capture_default_str()
       ->check(whole_number());
+  add_scenario_options(*verb, options->changes);
   verb->add_option("--duration", options->duration_s, "s; the scenario's own when left out")
       ->check(more_than_zero());
   verb->add_option("--out", options->out, "folder, created when missing; must not hold results yet")

@@ -117,7 +117,7 @@ Eigen::Vector3d body_rates(const Eigen::Vector3d& rpy, const Eigen::Vector3d& ra
 Drive::Drive(const Scenario& scenario, const Relief& relief, std::uint64_t seed, double duration_s)
     : start_ns_(scenario.start_ns()), duration_s_(duration_s) {
   const MotionConfig& config = scenario.motion;
-  const Path path(scenario.route->points());
+  const Path path(driven_route(scenario));
   const SpeedProfile profile(path, config);
   const auto n = static_cast<std::size_t>(std::ceil(duration_s / kKnot_s)) + 2 * kHalfWindow + 8;
   const std::vector<double> s_m = distances(profile, n);

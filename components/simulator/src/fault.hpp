@@ -54,9 +54,13 @@ struct ImuEpoch {
 /// One sweep before its rays are cast.
 struct SweepEpoch {
   Nanoseconds stamp_ns{0};
-  bool lost{false};     ///< no message at all
-  bool blank{false};    ///< a message without points
-  double dropout{0.0};  ///< share of returns lost
+  bool lost{false};               ///< no message at all
+  bool blank{false};              ///< a message without points
+  double dropout{0.0};            ///< share of returns lost
+  double nan_share{0.0};          ///< of the returns that come as not a number
+  std::optional<double> cover_m;  ///< every ray ends on a cover that near
+  std::optional<std::uint16_t> only_ring;
+  Nanoseconds stamp_shift_ns{0};  ///< what the scanner's clock is off by
 };
 
 /// The moment at which a fault acts.

@@ -8,7 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
+#include <limits>
 #include <numbers>
 #include <stdexcept>
 #include <thread>
@@ -17,7 +17,6 @@ namespace trigpoint::simulator {
 
 namespace {
 
-constexpr std::size_t kPointBytes = 22;  ///< as the Velodyne driver packs them
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kFirstAzimuth_rad =
     std::numbers::pi;  ///< the cut is behind, and it turns clockwise
@@ -25,6 +24,9 @@ constexpr double kFirstAzimuth_rad =
 /// lost: asphalt is seen up to about 50 m, walls to the end of the range.
 constexpr double kWeakSignal = 0.005;
 constexpr double kIntensityScale = 255.0;
+constexpr double kCoverReflectivity = 0.5;
+constexpr double kMovingMargin_m = 3.0;  ///< what comes into reach during a sweep
+constexpr std::uint64_t kSpoilKey = 0x6e616e;
 
 std::vector<double> evenly(double lowest_deg, double highest_deg, int count) {
   std::vector<double> elevations;
@@ -40,11 +42,6 @@ std::vector<double> hdl64_elevations() {
   const std::vector<double> upper = evenly(-8.33, 2.0, 32);
   elevations.insert(elevations.end(), upper.begin(), upper.end());
   return elevations;
-}
-
-void append(std::uint8_t*& at, const void* value, std::size_t bytes) {
-  std::memcpy(at, value, bytes);
-  at += bytes;
 }
 
 }  // namespace
@@ -92,7 +89,8 @@ double SpinningLidar::beam_delay_s(std::size_t beam) const {
 
 Eigen::Vector3d SpinningLidar::direction(std::int64_t firing, std::size_t beam) const {
   const double time_s = firing_time_s(firing) + beam_delay_s(beam);
-  const double azimuth = kFirstAzimuth_rad - 2.0 * std::numbers::pi * config_.rate_hz * time_s;
+  const double turned = 2.0 * std::numbers::pi * config_.rate_hz * time_s;
+  const double azimuth = kFirstAzimuth_rad + (config_.counter_clockwise ? turned : -turned);
   const double elevation = model_.elevations_rad[beam];
   return {std::cos(elevation) * std::cos(azimuth),
           std::cos(elevation) * std::sin(azimuth),
@@ -105,15 +103,20 @@ Nanoseconds SpinningLidar::sweep_ns() const {
 
 SpinningLidar::Return SpinningLidar::measure(const Eigen::Vector3d& direction,
                                              const Ray& ray,
-                                             const World& world,
-                                             double dropout) const {
-  const Hit hit = world.cast(ray, config_.max_range_m);
-  if (!hit.is_hit() || hit.range_m < config_.min_range_m) {
+                                             const Scene& scene,
+                                             const std::vector<MovingShape>& moving) const {
+  Hit hit = scene.world.cast(ray, config_.max_range_m);
+  std::optional<std::uint32_t> object;
+  if (!moving.empty()) {
+    object = intersect_moving(moving, ray, hit);
+  }
+  if (!hit.is_hit() || hit.range_m < config_.min_range_m || hit.range_m >= config_.max_range_m) {
     return {};
   }
   Random random(ray.key);
   const double signal = hit.reflectivity * hit.cos_incidence / std::pow(hit.range_m / 100.0, 2);
-  const double seen = (1.0 - config_.dropout) * (1.0 - dropout) * signal / (signal + kWeakSignal);
+  const double seen =
+      (1.0 - config_.dropout) * (1.0 - scene.sweep.dropout) * signal / (signal + kWeakSignal);
   if (!random.chance(seen)) {
     return {};
   }
@@ -122,21 +125,45 @@ SpinningLidar::Return SpinningLidar::measure(const Eigen::Vector3d& direction,
   const double sigma_m = config_.range_sigma_m * std::min(2.0, 1.0 + 0.1 * tangent);
   const double range_m = hit.range_m + sigma_m * random.normal();
   const double intensity = kIntensityScale * hit.reflectivity * hit.cos_incidence;
-  return {(range_m * direction).cast<float>(), static_cast<float>(std::round(intensity)), true};
+  Return seen_return{(range_m * direction).cast<float>(),
+                     static_cast<float>(std::round(intensity)),
+                     true,
+                     object,
+                     {}};
+  if (object) {
+    seen_return.true_map_m = (ray.origin_m + hit.range_m * ray.direction).cast<float>();
+  }
+  return seen_return;
+}
+
+SpinningLidar::Return SpinningLidar::on_cover(const Eigen::Vector3d& direction,
+                                              const Ray& ray,
+                                              double cover_m) const {
+  Random random(ray.key);
+  const double range_m = cover_m + config_.range_sigma_m * random.normal();
+  return {(range_m * direction).cast<float>(),
+          static_cast<float>(kIntensityScale * kCoverReflectivity),
+          true,
+          std::nullopt,
+          {}};
 }
 
 void SpinningLidar::scan_firings(std::int64_t first,
                                  std::int64_t last,
-                                 const SweepEpoch& sweep,
-                                 const Drive& drive,
-                                 const World& world,
+                                 const Scene& scene,
                                  std::vector<Return>& returns) const {
   const std::size_t beams = model_.elevations_rad.size();
-  const std::uint64_t key = derive_seed(seed_, static_cast<std::uint64_t>(sweep.stamp_ns));
-  const double start_s = to_seconds(sweep.stamp_ns - drive.first_ns());
+  const std::uint64_t key = derive_seed(seed_, static_cast<std::uint64_t>(scene.sweep.stamp_ns));
+  const double start_s = to_seconds(scene.sweep.stamp_ns - scene.drive.first_ns());
+  std::vector<MovingShape> moving;
   for (std::int64_t firing = first; firing < last; ++firing) {
-    const TrueState state = drive.at_time(start_s + firing_time_s(firing));
+    const double t_s = start_s + firing_time_s(firing);
+    const TrueState state = scene.drive.at_time(t_s);
     const Eigen::Matrix3d R = state.T_map_base.q.toRotationMatrix();
+    moving.clear();
+    if (!scene.near.empty()) {
+      scene.traffic->place(scene.near, t_s, moving);
+    }
     for (std::size_t beam = 0; beam < beams; ++beam) {
       const std::size_t index = static_cast<std::size_t>(firing) * beams + beam;
       // Within one firing (less than 50 us) the motion is a constant twist to below a micrometre.
@@ -147,63 +174,92 @@ void SpinningLidar::scan_firings(std::int64_t first,
       const Ray ray{state.T_map_base.p + dt * state.v_map_mps + turn(T_base_lidar_.p),
                     turn(T_base_lidar_.q * directions_[index]).normalized(),
                     derive_seed(key, index)};
-      returns[index] = measure(directions_[index], ray, world, sweep.dropout);
+      returns[index] = scene.sweep.cover_m ? on_cover(directions_[index], ray, *scene.sweep.cover_m)
+                                           : measure(directions_[index], ray, scene, moving);
     }
   }
 }
 
+SpinningLidar::Scene SpinningLidar::scene_of(const SweepEpoch& sweep,
+                                             const Drive& drive,
+                                             const World& world,
+                                             const Traffic* traffic) const {
+  Scene scene{sweep, drive, world, traffic, {}};
+  if (traffic != nullptr) {
+    const double t_s = to_seconds(sweep.stamp_ns - drive.first_ns()) + 0.5 / config_.rate_hz;
+    scene.near = traffic->near(
+        drive.at_time(t_s).T_map_base.p.head<2>(), config_.max_range_m + kMovingMargin_m, t_s);
+  }
+  return scene;
+}
+
 PointCloudMessage SpinningLidar::scan(const SweepEpoch& sweep,
                                       const Drive& drive,
-                                      const World& world) const {
+                                      const World& world,
+                                      const Traffic* traffic,
+                                      MovingSweep* moving) const {
   std::vector<Return> returns(directions_.size());
   if (!sweep.blank) {
+    const Scene scene = scene_of(sweep, drive, world, traffic);
     const std::int64_t threads = std::max<std::int64_t>(1, config_.threads);
     std::vector<std::jthread> workers;
     for (std::int64_t i = 1; i < threads; ++i) {
       workers.emplace_back([&, i] {
         scan_firings(config_.azimuth_steps * i / threads,
                      config_.azimuth_steps * (i + 1) / threads,
-                     sweep,
-                     drive,
-                     world,
+                     scene,
                      returns);
       });
     }
-    scan_firings(0, config_.azimuth_steps / threads, sweep, drive, world, returns);
+    scan_firings(0, config_.azimuth_steps / threads, scene, returns);
   }
-  return pack(returns, sweep.stamp_ns);
+  spoil(sweep, returns);
+  return pack(returns, sweep, moving);
+}
+
+void SpinningLidar::spoil(const SweepEpoch& sweep, std::vector<Return>& returns) const {
+  if (!sweep.only_ring && sweep.nan_share <= 0.0) {
+    return;
+  }
+  const std::size_t beams = model_.elevations_rad.size();
+  Random random(
+      derive_seed(derive_seed(seed_, kSpoilKey), static_cast<std::uint64_t>(sweep.stamp_ns)));
+  for (std::size_t i = 0; i < returns.size(); ++i) {
+    returns[i].seen = returns[i].seen && (!sweep.only_ring || i % beams == *sweep.only_ring);
+    if (random.chance(sweep.nan_share)) {
+      returns[i].point_m.setConstant(std::numeric_limits<float>::quiet_NaN());
+    }
+  }
 }
 
 PointCloudMessage SpinningLidar::pack(const std::vector<Return>& returns,
-                                      Nanoseconds stamp_ns) const {
-  PointCloudMessage message;
-  message.stamp_ns = stamp_ns;
-  message.frame_id = "lidar";
-  message.fields = {{"x", 0, 7, 1},
-                    {"y", 4, 7, 1},
-                    {"z", 8, 7, 1},
-                    {"intensity", 12, 7, 1},
-                    {"ring", 16, 4, 1},
-                    {"time", 18, 7, 1}};
-  message.point_step = kPointBytes;
-  message.width = static_cast<std::uint32_t>(
-      std::count_if(returns.begin(), returns.end(), [](const Return& r) { return r.seen; }));
-  message.row_step = message.width * message.point_step;
-  message.data.resize(message.row_step);
-  std::uint8_t* at = message.data.data();
+                                      const SweepEpoch& sweep,
+                                      MovingSweep* moving) const {
   const std::size_t beams = model_.elevations_rad.size();
+  std::vector<CloudPoint> points;
+  points.reserve(returns.size());
+  if (moving != nullptr) {
+    *moving = {sweep.stamp_ns + sweep.stamp_shift_ns, {}};
+  }
   for (std::size_t i = 0; i < returns.size(); ++i) {
-    if (!returns[i].seen) {
+    const Return& seen = returns[i];
+    if (!seen.seen) {
       continue;
     }
-    const auto ring = static_cast<std::uint16_t>(i % beams);
-    const auto time_s = static_cast<float>(firing_time_s(static_cast<std::int64_t>(i / beams)) +
-                                           beam_delay_s(i % beams));
-    append(at, returns[i].point_m.data(), 12);
-    append(at, &returns[i].intensity, 4);
-    append(at, &ring, 2);
-    append(at, &time_s, 4);
+    if (seen.object && moving != nullptr) {
+      moving->points.push_back({static_cast<std::uint32_t>(points.size()),
+                                *seen.object,
+                                seen.true_map_m.cast<double>()});
+    }
+    points.push_back(
+        {seen.point_m,
+         seen.intensity,
+         static_cast<std::uint16_t>(i % beams),
+         firing_time_s(static_cast<std::int64_t>(i / beams)) + beam_delay_s(i % beams)});
   }
+  PointCloudMessage message =
+      pack_cloud(config_.layout, sweep.stamp_ns + sweep.stamp_shift_ns, points);
+  message.is_dense = sweep.nan_share <= 0.0;
   return message;
 }
 

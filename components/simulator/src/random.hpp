@@ -78,7 +78,9 @@ enum Purpose : std::uint64_t {
   kImuSeed,
   kGnssSeed,
   kLidarSeed,
-  kFaultSeed
+  kFaultSeed,
+  kTrafficSeed,
+  kDaySeed
 };
 
 }  // namespace trigpoint::simulator

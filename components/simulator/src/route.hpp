@@ -3,6 +3,7 @@
 #pragma once
 
 #include "trigpoint/base/config.hpp"
+#include "trigpoint/simulator/scenario.hpp"
 
 #include "registry.hpp"
 
@@ -30,5 +31,9 @@ class Route {
 };
 
 const Registry<Route>& route_registry();
+
+/// The scenario's route as it is driven: from motion.start_m on, or from its end back. Throws
+/// ConfigError when nothing is left to drive.
+std::vector<RoutePoint> driven_route(const Scenario& scenario);
 
 }  // namespace trigpoint::simulator

@@ -2,23 +2,16 @@
 // Copyright the Trigpoint developers
 #include "trigpoint/simulator/scenario.hpp"
 
+#include "cloud_layout.hpp"
 #include "fault.hpp"
 #include "gnss_model.hpp"
 #include "imu_model.hpp"
 #include "lidar_model.hpp"
 #include "route.hpp"
 
-#include <algorithm>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <sstream>
-
 namespace trigpoint::simulator {
 
 namespace {
-
-namespace fs = std::filesystem;
 
 void describe_hall(HallConfig& hall, ConfigFields& fields) {
   fields.number("centre_east_m", hall.centre_east_m, "in map");
@@ -29,6 +22,45 @@ void describe_hall(HallConfig& hall, ConfigFields& fields) {
   fields.number("height_m", hall.height_m, "of the roof", {3.0, 50.0});
   fields.number("door_width_m", hall.door_width_m, "at both ends", {3.0, 200.0});
   fields.number("door_height_m", hall.door_height_m, "", {2.5, 50.0});
+}
+
+void describe_tunnel(TunnelConfig& tunnel, ConfigFields& fields) {
+  fields.number("centre_east_m", tunnel.centre_east_m, "in map");
+  fields.number("centre_north_m", tunnel.centre_north_m, "in map");
+  fields.number("yaw_rad", tunnel.yaw_rad, "of its axis");
+  fields.number("length_m", tunnel.length_m, "along it", {5.0, 2000.0});
+  fields.number("width_m", tunnel.width_m, "between the inner faces", {2.0, 50.0});
+  fields.number("height_m", tunnel.height_m, "of the walls", {2.0, 50.0});
+  fields.flag("roof", tunnel.roof, "false: a cutting, open to the sky");
+}
+
+void describe_clearing(ClearingConfig& clearing, ConfigFields& fields) {
+  fields.number("centre_east_m", clearing.centre_east_m, "in map");
+  fields.number("centre_north_m", clearing.centre_north_m, "in map");
+  fields.number("yaw_rad", clearing.yaw_rad, "of its length");
+  fields.number("length_m", clearing.length_m, "", kPositive);
+  fields.number("width_m", clearing.width_m, "", kPositive);
+}
+
+void describe_places(WorldConfig& world, ConfigFields& fields) {
+  fields.list(
+      "halls",
+      world.halls.size(),
+      "buildings that the route drives through",
+      [&world](std::size_t size) { world.halls.assign(size, HallConfig{}); },
+      [&world](ConfigFields& item, std::size_t i) { describe_hall(world.halls[i], item); });
+  fields.list(
+      "tunnels",
+      world.tunnels.size(),
+      "smooth, straight and open at both ends",
+      [&world](std::size_t size) { world.tunnels.assign(size, TunnelConfig{}); },
+      [&world](ConfigFields& item, std::size_t i) { describe_tunnel(world.tunnels[i], item); });
+  fields.list(
+      "clearings",
+      world.clearings.size(),
+      "rectangles on which nothing stands",
+      [&world](std::size_t size) { world.clearings.assign(size, ClearingConfig{}); },
+      [&world](ConfigFields& item, std::size_t i) { describe_clearing(world.clearings[i], item); });
 }
 
 void describe_world(WorldConfig& world, ConfigFields& fields) {
@@ -55,15 +87,32 @@ void describe_world(WorldConfig& world, ConfigFields& fields) {
   fields.number("pole_spacing_m", world.pole_spacing_m, "along each side; 0 = none", kNotNegative);
   fields.number(
       "car_spacing_m", world.car_spacing_m, "along each side, parked; 0 = none", kNotNegative);
-  fields.list(
-      "halls",
-      world.halls.size(),
-      "buildings that the route drives through",
-      [&world](std::size_t size) { world.halls.assign(size, HallConfig{}); },
-      [&world](ConfigFields& item, std::size_t i) { describe_hall(world.halls[i], item); });
+  fields.number("wood_spacing_m",
+                world.wood_spacing_m,
+                "between trees scattered off the route; 0 = none",
+                kNotNegative);
+  fields.number("bush_spacing_m",
+                world.bush_spacing_m,
+                "between bushes scattered off the route; 0 = none",
+                kNotNegative);
+  fields.number("scatter_reach_m", world.scatter_reach_m, "of both from the route", {5.0, 200.0});
+  fields.number("grass_height_m",
+                world.grass_height_m,
+                "of blades that stop light above the ground; 0 = bare",
+                {0.0, 1.0});
+  describe_places(world, fields);
+}
+
+void describe_traffic(TrafficConfig& traffic, ConfigFields& fields) {
+  constexpr Bounds kCount{0.0, 1000.0};
+  fields.integer("walkers", traffic.walkers, "people along the kerbs", kCount);
+  fields.integer("crossing", traffic.crossing, "people to and fro across the road", kCount);
+  fields.integer("cars", traffic.cars, "in the lanes, both ways", kCount);
 }
 
 void describe_motion(MotionConfig& motion, ConfigFields& fields) {
+  fields.number("start_m", motion.start_m, "along the route: where the drive begins", kNotNegative);
+  fields.flag("reverse", motion.reverse, "from the route's end to its start");
   fields.number(
       "rest_s", motion.rest_s, "standing still before the drive; 0 starts moving", kNotNegative);
   fields.number(
@@ -92,6 +141,8 @@ void describe_motion(MotionConfig& motion, ConfigFields& fields) {
 
 void describe_lidar(LidarConfig& lidar, ConfigFields& fields) {
   fields.choice("model", lidar.model, "beams", lidar_model_names());
+  fields.choice("layout", lidar.layout, "fields of a point", cloud_layout_names());
+  fields.flag("counter_clockwise", lidar.counter_clockwise, "rotation seen from above");
   fields.integer("azimuth_steps", lidar.azimuth_steps, "firings a revolution", {4.0, 10000.0});
   fields.number("rate_hz", lidar.rate_hz, "revolutions", {1.0, 100.0});
   fields.number("first_sweep_s", lidar.first_sweep_s, "after the start", kNotNegative);
@@ -187,45 +238,23 @@ void describe_fault(std::shared_ptr<Fault>& fault, ConfigFields& fields) {
   fault->describe(fields);
 }
 
-std::vector<fs::path> scenario_folders() {
-  std::vector<fs::path> folders;
-  if (const char* folder = std::getenv("TRIGPOINT_SCENARIOS"); folder != nullptr) {
-    folders.emplace_back(folder);
-  }
-  folders.emplace_back(TRIGPOINT_SCENARIOS_SOURCE);
-  folders.emplace_back(TRIGPOINT_SCENARIOS_INSTALLED);
-  return folders;
-}
-
-std::optional<fs::path> find_scenario(const std::string& file_or_name) {
-  std::error_code ignored;
-  const fs::path given(file_or_name);
-  if ((given.extension() == ".yaml" || given.extension() == ".yml") &&
-      fs::is_regular_file(given, ignored)) {
-    return given;
-  }
-  if (given.has_parent_path() || given.has_extension()) {
-    return std::nullopt;
-  }
-  for (const fs::path& folder : scenario_folders()) {
-    if (const fs::path file = folder / (file_or_name + ".yaml");
-        fs::is_regular_file(file, ignored)) {
-      return file;
-    }
-  }
-  return std::nullopt;
-}
-
 }  // namespace
 
 void describe(Scenario& scenario, ConfigFields& fields) {
   fields.text("name", scenario.name, "of the scenario");
+  fields.text("based_on", scenario.based_on, "a scenario that this one changes; empty: none");
   fields.number("duration_s",
                 scenario.duration_s,
                 "unless the caller says otherwise; stands still when the route is over",
                 {0.1, 1e5});
-  fields.integer(
-      "start_time_s", scenario.start_time_s, "stamp of the start, Unix seconds", kNotNegative);
+  fields.integer("start_time_s",
+                 scenario.start_time_s,
+                 "stamp of the start on day 0, Unix seconds",
+                 kNotNegative);
+  fields.integer("day",
+                 scenario.day,
+                 "another day in the same world: new noise, stamps so many days later",
+                 {0.0, 10000.0});
   fields.section(
       "datum", "origin of map", [&](ConfigFields& f) { describe_datum(scenario.datum, f); });
   fields.section(
@@ -237,6 +266,9 @@ void describe(Scenario& scenario, ConfigFields& fields) {
       "route", "plan view of the drive", [&](ConfigFields& f) { describe_route(scenario, f); });
   fields.section(
       "motion", "how it is driven", [&](ConfigFields& f) { describe_motion(scenario.motion, f); });
+  fields.section("traffic", "what moves besides the robot", [&](ConfigFields& f) {
+    describe_traffic(scenario.traffic, f);
+  });
   fields.section(
       "lidar", "spinning LiDAR", [&](ConfigFields& f) { describe_lidar(scenario.lidar, f); });
   fields.section(
@@ -249,59 +281,6 @@ void describe(Scenario& scenario, ConfigFields& fields) {
       "what goes wrong, and when",
       [&](std::size_t size) { scenario.faults.assign(size, nullptr); },
       [&](ConfigFields& item, std::size_t i) { describe_fault(scenario.faults[i], item); });
-}
-
-Scenario load_scenario_text(const std::string& yaml, const std::string& name) {
-  Scenario scenario;
-  load_config_text(yaml, name, [&](ConfigFields& fields) { describe(scenario, fields); });
-  scenario.source_yaml = yaml;
-  if (!scenario.route) {
-    throw ConfigError(name + ": has no section route");
-  }
-  try {
-    static_cast<void>(scenario.route->points());
-  } catch (const ConfigError& error) {
-    throw ConfigError(name + ": " + error.what());
-  }
-  return scenario;
-}
-
-Scenario load_scenario(const std::string& file_or_name) {
-  const std::optional<fs::path> path = find_scenario(file_or_name);
-  if (!path) {
-    std::string places;
-    for (const fs::path& folder : scenario_folders()) {
-      places += "\n  " + folder.string();
-    }
-    throw ConfigError(file_or_name + ": is neither a scenario file (.yaml) nor the name of one in" +
-                      places);
-  }
-  std::ifstream file(*path);
-  std::stringstream text;
-  text << file.rdbuf();
-  if (!file) {
-    throw ConfigError(path->string() + ": cannot be read");
-  }
-  return load_scenario_text(text.str(), path->string());
-}
-
-bool is_scenario(const std::string& file_or_name) {
-  return find_scenario(file_or_name).has_value();
-}
-
-std::vector<std::string> shipped_scenarios() {
-  std::vector<std::string> names;
-  std::error_code ignored;
-  for (const fs::path& folder : scenario_folders()) {
-    for (const auto& entry : fs::directory_iterator(folder, ignored)) {
-      if (entry.path().extension() == ".yaml") {
-        names.push_back(entry.path().stem().string());
-      }
-    }
-  }
-  std::sort(names.begin(), names.end());
-  names.erase(std::unique(names.begin(), names.end()), names.end());
-  return names;
 }
 
 }  // namespace trigpoint::simulator

@@ -11,11 +11,15 @@
 #include "relief.hpp"
 #include "route.hpp"
 #include "town.hpp"
+#include "traffic.hpp"
 #include "world.hpp"
 
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <limits>
 #include <optional>
+#include <stdexcept>
 #include <vector>
 
 namespace trigpoint::simulator {
@@ -23,6 +27,13 @@ namespace trigpoint::simulator {
 namespace {
 
 using recording::LogEntry;
+
+/// The world is the same every day; noise, vibration and traffic are not.
+std::uint64_t seed_of_day(const Scenario& scenario, std::uint64_t seed) {
+  return scenario.day == 0
+             ? seed
+             : derive_seed(derive_seed(seed, kDaySeed), static_cast<std::uint64_t>(scenario.day));
+}
 
 /// The moments at which one sensor measures.
 class Epochs {
@@ -63,11 +74,20 @@ struct Pending {
 class Stream final : public ScenarioReader {
  public:
   Stream(const Scenario& scenario,
+         std::uint64_t world_seed,
+         double duration_s,
+         const StreamOptions& options)
+      : Stream(scenario, world_seed, seed_of_day(scenario, world_seed), duration_s, options) {}
+
+ private:
+  Stream(const Scenario& scenario,
+         std::uint64_t world_seed,
          std::uint64_t seed,
          double duration_s,
          const StreamOptions& options)
       : scenario_(scenario),
-        relief_(scenario.world, seed),
+        options_(options),
+        relief_(scenario.world, world_seed),
         drive_(std::make_shared<Drive>(scenario, relief_, seed, duration_s)),
         earth_(scenario.datum, scenario.imu.earth_rotation),
         imu_(scenario.imu, seed),
@@ -84,13 +104,26 @@ class Stream final : public ScenarioReader {
     if (options.lidar) {
       const Path path(scenario.route->points());
       world_.emplace(relief_,
-                     build_town(scenario.world, path, relief_, seed),
+                     build_town(scenario.world, path, relief_, world_seed),
                      drive_->track(1.0),
-                     scenario.lidar.max_range_m + 10.0);
+                     scenario.lidar.max_range_m + 10.0,
+                     scenario.world.grass_height_m);
+      populate(seed);
     }
     summarise();
   }
 
+  /// The same traffic for any duration: it keeps clear of the whole drive.
+  void populate(std::uint64_t seed) {
+    const TrafficConfig& config = scenario_.traffic;
+    if (config.walkers + config.crossing + config.cars > 0) {
+      const Drive whole(
+          scenario_, relief_, seed, std::max(scenario_.duration_s, drive_->duration_s()));
+      traffic_.emplace(scenario_, relief_, whole, seed);
+    }
+  }
+
+ public:
   const recording::LogSummary& summary() const override { return summary_; }
 
   std::optional<std::string> truth_file() const override { return truth_file_; }
@@ -109,6 +142,12 @@ class Stream final : public ScenarioReader {
   void write_truth(const std::string& path) override {
     simulator::write_truth(*drive_, scenario_.datum, path);
     truth_file_ = path;
+    if (traffic_) {
+      const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+      write_moving_objects(*traffic_, *drive_, (folder / "moving_objects.txt").string());
+      moving_file_.open(folder / "moving_points.txt");
+      moving_file_ << "# points of moving objects: stamp_ns point object east_m north_m up_m\n";
+    }
   }
 
   std::optional<LogEntry> next() override {
@@ -199,8 +238,33 @@ class Stream final : public ScenarioReader {
     SweepEpoch epoch;
     epoch.stamp_ns = sweep_epochs_.take();
     faults_.apply(epoch);
-    if (!epoch.lost) {
-      push(epoch.stamp_ns + from_seconds(sweep_delay_s()), lidar_.scan(epoch, *drive_, *world_));
+    if (epoch.lost) {
+      return;
+    }
+    MovingSweep moving;
+    push(epoch.stamp_ns + from_seconds(sweep_delay_s()),
+         lidar_.scan(epoch, *drive_, *world_, traffic_ ? &*traffic_ : nullptr, &moving));
+    if (traffic_) {
+      tell(moving);
+    }
+  }
+
+  void tell(const MovingSweep& moving) {
+    if (options_.on_moving) {
+      options_.on_moving(moving);
+    }
+    if (!moving_file_.is_open()) {
+      return;
+    }
+    for (const MovingPoint& point : moving.points) {
+      moving_file_ << moving.stamp_ns << ' ' << point.point << ' ' << point.object << ' '
+                   << point.p_map_m.x() << ' ' << point.p_map_m.y() << ' ' << point.p_map_m.z()
+                   << '\n';
+    }
+    moving_file_.flush();
+    if (!moving_file_) {
+      throw std::runtime_error("moving_points.txt beside " + *truth_file_ +
+                               " cannot be written (is the disk full?)");
     }
   }
 
@@ -251,6 +315,7 @@ class Stream final : public ScenarioReader {
   }
 
   Scenario scenario_;
+  StreamOptions options_;
   Relief relief_;
   std::shared_ptr<Drive> drive_;
   EarthAtDatum earth_;
@@ -259,6 +324,8 @@ class Stream final : public ScenarioReader {
   SpinningLidar lidar_;
   FaultSchedule faults_;
   std::optional<World> world_;
+  std::optional<Traffic> traffic_;
+  std::ofstream moving_file_;
   std::optional<ImuSample> last_imu_;  ///< that was not frozen
   Epochs imu_epochs_;
   Epochs fix_epochs_;
@@ -283,8 +350,10 @@ std::unique_ptr<ScenarioReader> open_scenario(const Scenario& scenario,
 std::shared_ptr<const Truth> make_truth(const Scenario& scenario,
                                         std::uint64_t seed,
                                         std::optional<double> duration_s) {
-  return std::make_shared<Drive>(
-      scenario, Relief(scenario.world, seed), seed, duration_s.value_or(scenario.duration_s));
+  return std::make_shared<Drive>(scenario,
+                                 Relief(scenario.world, seed),
+                                 seed_of_day(scenario, seed),
+                                 duration_s.value_or(scenario.duration_s));
 }
 
 }  // namespace trigpoint::simulator

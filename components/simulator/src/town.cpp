@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace trigpoint::simulator {
@@ -17,6 +18,7 @@ constexpr double kBelowGround_m =
     3.0;  ///< foundations, so that no light passes under a wall on a slope
 constexpr double kWall_m = 0.3;
 constexpr double kFloor_m = 3.2;
+constexpr double kCrownClearance_m = 0.9;  ///< from the route to leaves off it
 
 class Builder {
  public:
@@ -34,6 +36,13 @@ class Builder {
     for (const HallConfig& hall : config_.halls) {
       build_hall(hall);
     }
+    for (const TunnelConfig& tunnel : config_.tunnels) {
+      build_tunnel(tunnel);
+    }
+    for (const ClearingConfig& c : config_.clearings) {
+      taken_.push_back(
+          {{c.centre_east_m, c.centre_north_m}, {0.5 * c.length_m, 0.5 * c.width_m}, c.yaw_rad});
+    }
     along_route(config_.building_spacing_m,
                 [this](const Path::Place& place, double side) { try_building(place, side); });
     along_route(config_.car_spacing_m,
@@ -42,6 +51,8 @@ class Builder {
                 [this](const Path::Place& place, double side) { try_pole(place, side); });
     along_route(config_.tree_spacing_m,
                 [this](const Path::Place& place, double side) { try_tree(place, side); });
+    scatter(config_.wood_spacing_m, [this](const Eigen::Vector2d& at) { try_wood_tree(at); });
+    scatter(config_.bush_spacing_m, [this](const Eigen::Vector2d& at) { try_bush(at); });
     return std::move(shapes_);
   }
 
@@ -57,6 +68,38 @@ class Builder {
         attempt(path_.at(s_m), side);
       }
     }
+  }
+
+  /// A place in every square of a grid that has the route within reach.
+  template <typename Try>
+  void scatter(double spacing_m, const Try& attempt) {
+    if (spacing_m <= 0.0) {
+      return;
+    }
+    Eigen::Vector2d lowest = track_m_.front();
+    Eigen::Vector2d highest = lowest;
+    for (const Eigen::Vector2d& p : track_m_) {
+      lowest = lowest.cwiseMin(p);
+      highest = highest.cwiseMax(p);
+    }
+    const double reach_m = config_.scatter_reach_m;
+    for (double east = lowest.x() - reach_m; east < highest.x() + reach_m; east += spacing_m) {
+      for (double north = lowest.y() - reach_m; north < highest.y() + reach_m; north += spacing_m) {
+        const double u = random_.uniform(0.0, spacing_m);
+        const Eigen::Vector2d at(east + u, north + random_.uniform(0.0, spacing_m));
+        if (distance_to_route_m(at) < reach_m) {
+          attempt(at);
+        }
+      }
+    }
+  }
+
+  double distance_to_route_m(const Eigen::Vector2d& at) const {
+    double square = std::numeric_limits<double>::infinity();
+    for (const Eigen::Vector2d& p : track_m_) {
+      square = std::min(square, (p - at).squaredNorm());
+    }
+    return std::sqrt(square);
   }
 
   double ground_m(const Eigen::Vector2d& at) const { return relief_.height_m(at.x(), at.y()); }
@@ -213,6 +256,73 @@ class Builder {
     crown.reflectivity = 0.45;
     crown.free_path_m = free_path_m;
     shapes_.push_back(crown);
+  }
+
+  void add_leaves(const Eigen::Vector3d& centre_m,
+                  const Eigen::Vector3d& half_m,
+                  double free_path_m) {
+    Shape leaves;
+    leaves.kind = Shape::Kind::kFoliage;
+    leaves.centre_m = centre_m;
+    leaves.half_m = half_m;
+    leaves.reflectivity = 0.45;
+    leaves.free_path_m = free_path_m;
+    shapes_.push_back(leaves);
+  }
+
+  /// A trunk that leans on nothing and a crown of several clumps of leaves with light between them.
+  void try_wood_tree(const Eigen::Vector2d& at) {
+    const double crown_m = random_.uniform(1.4, 2.6);
+    const double trunk_m = random_.uniform(2.4, 4.0);
+    const double radius_m = random_.uniform(0.1, 0.3);
+    const double foot_m = 0.3 * crown_m;
+    if (!claim({at, Eigen::Vector2d::Constant(foot_m), 0.0},
+               std::max(config_.road_half_width_m, crown_m + kCrownClearance_m))) {
+      return;
+    }
+    const double ground = ground_m(at);
+    add_cylinder(at, radius_m, trunk_m + 0.8 * crown_m, 0.35);
+    const int clumps = 3 + static_cast<int>(random_.uniform(0.0, 3.0));
+    for (int i = 0; i < clumps; ++i) {
+      const double clump_m = random_.uniform(0.35, 0.6) * crown_m;
+      const Eigen::Vector3d off = random_.level_vector(0.0, crown_m - clump_m);
+      const double up_m = trunk_m + random_.uniform(0.0, 1.4) * crown_m;
+      add_leaves(Eigen::Vector3d(at.x(), at.y(), ground + up_m) + off,
+                 {clump_m, clump_m, 0.8 * clump_m},
+                 random_.uniform(0.4, 1.2));
+    }
+  }
+
+  void try_bush(const Eigen::Vector2d& at) {
+    const double radius_m = random_.uniform(0.5, 1.3);
+    const double height_m = random_.uniform(0.7, 1.8);
+    if (claim({at, Eigen::Vector2d::Constant(0.7 * radius_m), 0.0},
+              std::max(config_.road_half_width_m, radius_m + kCrownClearance_m))) {
+      add_leaves({at.x(), at.y(), ground_m(at) + 0.4 * height_m},
+                 {radius_m, radius_m, 0.6 * height_m},
+                 random_.uniform(0.2, 0.5));
+    }
+  }
+
+  /// Nothing in it but walls, and a roof if it has one.
+  void build_tunnel(const TunnelConfig& tunnel) {
+    const Footprint frame{{tunnel.centre_east_m, tunnel.centre_north_m},
+                          {0.5 * tunnel.length_m, 0.5 * tunnel.width_m + 2.0 * kWall_m},
+                          tunnel.yaw_rad};
+    taken_.push_back(frame);
+    const double ground = ground_m(frame.centre_m);
+    const double top = ground + tunnel.height_m;
+    for (const double side : {-1.0, 1.0}) {
+      add_part(frame,
+               {0.0, side * (0.5 * tunnel.width_m + kWall_m)},
+               {frame.half_m.x(), kWall_m},
+               ground - kBelowGround_m,
+               top,
+               0.4);
+    }
+    if (tunnel.roof) {
+      add_box(frame, top, top + kWall_m, 0.4);
+    }
   }
 
   void build_hall(const HallConfig& hall) {

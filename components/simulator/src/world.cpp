@@ -2,6 +2,8 @@
 // Copyright the Trigpoint developers
 #include "world.hpp"
 
+#include "random.hpp"
+
 #include <algorithm>
 #include <cmath>
 
@@ -14,6 +16,9 @@ constexpr double kGroundReflectivity = 0.25;
 constexpr double kFirstStep_m = 0.5;  ///< no wave of the relief is shorter than many of these
 constexpr double kStepGrowth = 0.02;
 constexpr int kRefinements = 3;
+constexpr double kGrassFreePath_m = 0.3;  ///< mean way of light between blades, as in a crown
+constexpr double kGrassReflectivity = 0.4;
+constexpr std::uint64_t kGrassKey = 0x6772617373;
 
 Eigen::Vector2d lowest_of(const std::vector<Eigen::Vector2d>& points) {
   Eigen::Vector2d lowest = points.front();
@@ -159,10 +164,12 @@ void GroundGrid::intersect(const Ray& ray, double max_range_m, Hit& hit) const {
 World::World(const Relief& relief,
              std::vector<Shape> shapes,
              const std::vector<Eigen::Vector2d>& track_m,
-             double margin_m)
+             double margin_m,
+             double grass_height_m)
     : ground_(relief,
               lowest_of(track_m) - Eigen::Vector2d::Constant(margin_m),
               highest_of(track_m) + Eigen::Vector2d::Constant(margin_m)),
+      grass_height_m_(grass_height_m),
       shapes_(std::move(shapes)) {
   build_cells();
 }
@@ -208,8 +215,20 @@ Hit World::cast(const Ray& ray, double max_range_m) const {
   Hit hit;
   hit.range_m = max_range_m;
   ground_.intersect(ray, max_range_m, hit);
+  if (grass_height_m_ > 0.0 && hit.range_m < max_range_m) {
+    stop_in_grass(ray, hit);
+  }
   intersect_shapes(ray, max_range_m, hit);
   return hit.range_m < max_range_m ? hit : Hit{};
+}
+
+void World::stop_in_grass(const Ray& ray, Hit& hit) const {
+  const double through_m = std::min(hit.range_m, grass_height_m_ / hit.cos_incidence);
+  Random random(derive_seed(ray.key, kGrassKey));
+  const double depth_m = -kGrassFreePath_m * std::log(1.0 - random.uniform());
+  if (depth_m < through_m) {
+    hit = {hit.range_m - through_m + depth_m, random.uniform(0.4, 1.0), kGrassReflectivity};
+  }
 }
 
 void World::intersect_shapes(const Ray& ray, double max_range_m, Hit& hit) const {

@@ -38,7 +38,8 @@ class World {
   World(const Relief& relief,
         std::vector<Shape> shapes,
         const std::vector<Eigen::Vector2d>& track_m,
-        double margin_m);
+        double margin_m,
+        double grass_height_m = 0.0);
 
   /// The nearest thing along the ray. Safe to call from several threads.
   Hit cast(const Ray& ray, double max_range_m) const;
@@ -58,7 +59,11 @@ class World {
   void intersect_shapes(const Ray& ray, double max_range_m, Hit& hit) const;
   void intersect_cell(const Cell& cell, const Ray& ray, double lowest_m, Hit& hit) const;
 
+  /// Shortens a hit on the ground to the blade above it that stops the light.
+  void stop_in_grass(const Ray& ray, Hit& hit) const;
+
   GroundGrid ground_;
+  double grass_height_m_{0.0};
   std::vector<Shape> shapes_;
   Eigen::Vector2d lowest_m_{Eigen::Vector2d::Zero()};
   int columns_{0};

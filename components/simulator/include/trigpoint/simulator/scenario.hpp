@@ -32,6 +32,27 @@ struct HallConfig {
   double door_height_m{4.0};
 };
 
+/// A straight bore with smooth walls, a flat floor where the relief is flat, and open ends: along
+/// its axis a scanner sees nothing that stands still or moves.
+struct TunnelConfig {
+  double centre_east_m{0.0};
+  double centre_north_m{0.0};
+  double yaw_rad{0.0};  ///< of its axis
+  double length_m{300.0};
+  double width_m{7.0};  ///< between the inner faces
+  double height_m{5.0};
+  bool roof{true};  ///< false: a cutting, open to the sky
+};
+
+/// A rectangle on which nothing stands.
+struct ClearingConfig {
+  double centre_east_m{0.0};
+  double centre_north_m{0.0};
+  double yaw_rad{0.0};
+  double length_m{100.0};
+  double width_m{100.0};
+};
+
 /// What stands along the route. Every density is per side of the route; 0 leaves the kind out.
 struct WorldConfig {
   double relief_amplitude_m{0.8};     ///< of each of three waves of the ground
@@ -43,11 +64,26 @@ struct WorldConfig {
   double tree_spacing_m{14.0};
   double pole_spacing_m{25.0};
   double car_spacing_m{18.0};
+  double wood_spacing_m{0.0};    ///< between trees scattered off the route; 0 = none
+  double bush_spacing_m{0.0};    ///< between bushes scattered off the route; 0 = none
+  double scatter_reach_m{45.0};  ///< from the route, of both
+  double grass_height_m{0.0};    ///< of blades that stop light above the ground; 0 = bare
   std::vector<HallConfig> halls;
+  std::vector<TunnelConfig> tunnels;
+  std::vector<ClearingConfig> clearings;
+};
+
+/// What moves besides the robot, along and across the route; see traffic.hpp.
+struct TrafficConfig {
+  std::int64_t walkers{0};   ///< along the kerbs
+  std::int64_t crossing{0};  ///< to and fro across the road
+  std::int64_t cars{0};      ///< in the lanes, both ways
 };
 
 /// How the route is driven.
 struct MotionConfig {
+  double start_m{0.0};                      ///< along the route: where the drive begins
+  bool reverse{false};                      ///< from the route's end to its start
   double rest_s{2.5};                       ///< standing still before the drive; 0 starts moving
   double acceleration_mps2{0.8};            ///< speeding up and braking
   double lateral_acceleration_mps2{1.2};    ///< limits the speed in curves
@@ -60,6 +96,8 @@ struct MotionConfig {
 
 struct LidarConfig {
   std::string model{"vlp16"};
+  std::string layout{"velodyne"};  ///< fields of a point, see cloud_layout.hpp
+  bool counter_clockwise{false};   ///< direction of rotation, seen from above
   std::int64_t azimuth_steps{1800};
   double rate_hz{10.0};
   double first_sweep_s{0.013};
@@ -100,37 +138,47 @@ struct GnssConfig {
 
 struct Scenario {
   std::string name{"unnamed"};
-  std::string source_yaml;  ///< the file's text, as it was loaded
+  std::string source_yaml;  ///< that loads to the same: the file's text, or all of a composed one
+  std::string based_on;     ///< a scenario whose settings this one changes; empty: the defaults
   double duration_s{120.0};
-  std::int64_t start_time_s{1'700'000'000};  ///< stamp of t = 0
+  std::int64_t start_time_s{1'700'000'000};  ///< stamp of t = 0 on day 0
+  /// Another day in the same world: all noise is new, and stamps are days later.
+  std::int64_t day{0};
   Datum datum{43.9456, -78.8968, 100.0, 0};  ///< origin of map; the ground is near height 0 of map
   RobotConfig robot;
   WorldConfig world;
   std::string route_type{"waypoints"};
   std::shared_ptr<Route> route;
   MotionConfig motion;
+  TrafficConfig traffic;
   LidarConfig lidar;
   ImuConfig imu;
   GnssConfig gnss;
   std::vector<std::shared_ptr<Fault>> faults;
 
-  Nanoseconds start_ns() const { return start_time_s * kNanosecondsPerSecond; }
+  Nanoseconds start_ns() const { return (start_time_s + 86'400 * day) * kNanosecondsPerSecond; }
 };
 
 void describe(Scenario& scenario, ConfigFields& fields);
 
-/// Loads a file, or a shipped scenario by its name ("campus"), strictly. Shipped ones are looked
-/// for in TRIGPOINT_SCENARIOS (environment), the source tree of the build and the installed share
-/// folder. Throws ConfigError with file, line and rule, or naming the places searched.
-Scenario load_scenario(const std::string& file_or_name);
+/// Loads a file, or a shipped scenario by its name ("campus"), strictly, with changes appended to
+/// it: "campus+beams_32+wrong_fix+motion.start_m=150" takes overlays (shipped ones by name, or
+/// files) and single keys, from left to right; faults add up. Shipped ones are looked for in
+/// TRIGPOINT_SCENARIOS (environment), the source tree of the build and the installed share folder.
+/// Throws ConfigError with file, line and rule, or naming the places searched.
+Scenario load_scenario(const std::string& composed);
 
 /// The same from YAML text; `name` stands for the file in errors.
 Scenario load_scenario_text(const std::string& yaml, const std::string& name);
 
-/// Whether load_scenario would find it: an existing .yaml file or the name of a shipped scenario.
-bool is_scenario(const std::string& file_or_name);
+/// Whether what stands before the first plus is an existing .yaml file or a shipped scenario's
+/// name.
+bool is_scenario(const std::string& composed);
 
 /// Names of the shipped scenarios, sorted.
 std::vector<std::string> shipped_scenarios();
+
+/// Names of the shipped overlays ("beams_32"), sorted.
+std::vector<std::string> shipped_overlays();
 
 }  // namespace trigpoint::simulator

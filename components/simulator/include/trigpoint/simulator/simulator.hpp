@@ -16,6 +16,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace trigpoint::simulator {
 
@@ -49,8 +50,23 @@ void write_truth(const Truth& truth,
                  const std::string& path,
                  double rate_hz = 100.0);
 
+/// Truth about one point of a sweep that lies on a moving object.
+struct MovingPoint {
+  std::uint32_t point{0};                            ///< index in the cloud
+  std::uint32_t object{0};                           ///< which of the moving ones
+  Eigen::Vector3d p_map_m{Eigen::Vector3d::Zero()};  ///< where the ray met it
+};
+
+/// For evaluation only: which points of a sweep are of moving objects.
+struct MovingSweep {
+  Nanoseconds stamp_ns{0};  ///< of the cloud
+  std::vector<MovingPoint> points;
+};
+
 struct StreamOptions {
   bool lidar{true};
+  /// Called for every sweep when it is made, in a scenario with traffic.
+  std::function<void(const MovingSweep&)> on_moving{};
 };
 
 /// A LogReader that makes its entries while it is read.
@@ -58,7 +74,8 @@ class ScenarioReader : public recording::LogReader {
  public:
   virtual std::shared_ptr<const Truth> truth() const = 0;
   virtual const Scenario& scenario() const = 0;
-  /// Writes the truth and gives its path to truth_file() from now on.
+  /// Writes the truth and gives its path to truth_file() from now on. In a scenario with traffic
+  /// also moving_objects.txt and, while it is read, moving_points.txt beside it.
   virtual void write_truth(const std::string& path) = 0;
 };
 
@@ -71,9 +88,9 @@ std::unique_ptr<ScenarioReader> open_scenario(const Scenario& scenario,
 /// Called with a share of 0 to 1.
 using Progress = std::function<void(double)>;
 
-/// Writes out_dir/log (rosbag2), truth.tum, scenario.yaml and robot.yaml (an overlay with the
-/// section `robot`). Throws recording::LogError or std::runtime_error naming the file and the
-/// cause; out_dir may exist, out_dir/log must not.
+/// Writes out_dir/log (rosbag2), truth.tum (with traffic: moving_*.txt), scenario.yaml and
+/// robot.yaml (an overlay with the section `robot`). Throws recording::LogError or
+/// std::runtime_error naming the file and the cause; out_dir may exist, out_dir/log must not.
 void simulate(const Scenario& scenario,
               std::uint64_t seed,
               std::optional<double> duration_s,
