@@ -146,6 +146,7 @@ class Stream final : public ScenarioReader {
       const std::filesystem::path folder = std::filesystem::path(path).parent_path();
       write_moving_objects(*traffic_, *drive_, (folder / "moving_objects.txt").string());
       moving_file_.open(folder / "moving_points.txt");
+      moving_file_.precision(9);
       moving_file_ << "# points of moving objects: stamp_ns point object east_m north_m up_m\n";
     }
   }
