@@ -298,6 +298,7 @@ class Stream final : public ScenarioReader {
     for (Epochs epochs = fix_epochs_; !epochs.is_over();) {
       GnssEpoch epoch;
       epoch.stamp_ns = epochs.take();
+      epoch.gnss_class = scenario_.gnss.gnss_class;
       faults_.apply(epoch);
       count += epoch.lost ? 0U : 1U + static_cast<std::uint64_t>(epoch.copies);
     }

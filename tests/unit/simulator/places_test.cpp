@@ -82,7 +82,7 @@ TEST(Places, have_a_park_of_leaves_and_hardly_a_plane_but_the_ground) {
   int hits = 0;
   int leaves = 0;
   int planes = 0;
-  for (double t = 10.0; t < 180.0; t += 10.0) {
+  for (double t = 10.0; t < 180.0; t += 40.0) {
     look_around(park, park.scanner_m(t), [&](const Ray& ray, const Hit& hit) {
       const Eigen::Vector3d p = ray.origin_m + hit.range_m * ray.direction;
       ++hits;
@@ -96,7 +96,7 @@ TEST(Places, have_a_park_of_leaves_and_hardly_a_plane_but_the_ground) {
       }
     });
   }
-  ASSERT_GT(hits, 10000);
+  ASSERT_GT(hits, 5000);
   EXPECT_GT(static_cast<double>(leaves) / hits, 0.3);
   EXPECT_LT(static_cast<double>(leaves) / hits, 0.9);
   EXPECT_EQ(planes, 0);

@@ -67,7 +67,7 @@ TEST(Traffic, gives_points_that_lie_on_the_object_at_their_own_time) {
   constexpr double kFloat_m = 1e-3;  // float32 coordinates 400 m from the origin, and 8 m/s
   int people = 0;
   int cars = 0;
-  for (double t_s = 5.0; t_s < 120.0; t_s += 5.0) {
+  for (double t_s = 5.0; t_s < 120.0; t_s += 20.0) {
     SweepEpoch sweep;
     sweep.stamp_ns = street.stamp_ns(t_s);
     MovingSweep moving;
@@ -84,8 +84,8 @@ TEST(Traffic, gives_points_that_lie_on_the_object_at_their_own_time) {
       (street.traffic.is_car(truth.object) ? cars : people) += 1;
     }
   }
-  EXPECT_GT(people, 1000);
-  EXPECT_GT(cars, 1000);
+  EXPECT_GT(people, 300);
+  EXPECT_GT(cars, 300);
 }
 
 TEST(Traffic, leaves_no_point_on_an_object_unsaid) {
@@ -119,7 +119,7 @@ TEST(Traffic, leaves_no_point_on_an_object_unsaid) {
 TEST(Traffic, moves_at_walking_and_driving_pace_and_keeps_clear_of_the_robot) {
   const Street street;
   ASSERT_GE(street.traffic.size(), 40U);
-  constexpr double kStep_s = 0.05;
+  constexpr double kStep_s = 0.2;
   for (std::size_t i = 0; i < street.traffic.size(); ++i) {
     double farthest_m = 0.0;
     for (double t_s = 0.0; t_s < 180.0; t_s += kStep_s) {
