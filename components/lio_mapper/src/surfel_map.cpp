@@ -40,6 +40,17 @@ constexpr double kNearestLeafReach = 2.0;
 /// (5 mm)^2: no LiDAR knows a surface better, however well the means agree.
 constexpr double kThicknessFloor2_m2 = 2.5e-5;
 
+/// Planes are fitted anew when a leaf has 1, 2, 3, 5, 8, 13, ... points: in between its mean moves
+/// by less than its own noise, and fitting is most of the map's cost.
+bool matters_to_planes(std::size_t count, std::size_t capacity) {
+  std::size_t a = 1;
+  std::size_t b = 2;
+  while (a < count) {
+    a = std::exchange(b, a + b);
+  }
+  return a == count || count == capacity;
+}
+
 constexpr int slot(int x, int y, int z) {
   return (x * kSide + y) * kSide + z;
 }
@@ -136,7 +147,9 @@ void SurfelMap::insert_mean(const PointXyzi& point, std::uint16_t count) {
   mean.z += share * (local.z() - mean.z);
   mean.intensity +=
       share * ((std::isfinite(point.intensity) ? point.intensity : 0.0F) - mean.intensity);
-  mark_dirty(parent, inner);
+  if (matters_to_planes(parent.counts[i], config_.leaf_capacity)) {
+    mark_dirty(parent, inner);
+  }
 }
 
 /// The leaf that a point belongs to. Where a surface runs along a face of the leaves, its noise

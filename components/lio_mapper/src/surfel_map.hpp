@@ -22,8 +22,8 @@ namespace trigpoint::lio_mapper {
 /// any other: the fit also sees the leaves of the neighbouring parents that touch this one, and a
 /// query near a face also looks behind it.
 ///
-/// A plane is a function of the leaves alone, not of who asked when, so threads that match at once
-/// all get the same bits.
+/// Between two insertions a plane is a function of the leaves alone, not of who asked first, so
+/// threads that match at once all get the same bits.
 class SurfelMap final : public LocalMap {
  public:
   explicit SurfelMap(const SurfelMapConfig& config);

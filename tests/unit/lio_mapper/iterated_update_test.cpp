@@ -254,7 +254,7 @@ TEST(ScanMatcher, sums_to_the_same_bits_on_any_number_of_threads) {
   std::mt19937 random(3);
   std::uniform_real_distribution<float> place(-9.0F, 12.0F);
   PointCloud points;
-  for (int i = 0; i < 5000; ++i) {
+  for (int i = 0; i < 30000; ++i) {
     points.push_back({place(random), place(random), 0.2F * place(random), 0.0F});
   }
   const RoomMap map;
