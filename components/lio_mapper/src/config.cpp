@@ -104,6 +104,7 @@ void describe_matching(MatchingConfig& c, ConfigFields& f) {
            c.converged_rotation_rad,
            "smaller steps end the iteration",
            kPositive);
+  f.integer("threads", c.threads, "that match; the result is the same for any number", {1, 64});
   f.number("lost_after_s",
            c.lost_after_s,
            "time without a usable scan after which the track is lost",
@@ -126,7 +127,24 @@ void describe_surfel_map(SurfelMapConfig& c, ConfigFields& f) {
            "middle over largest eigenvalue: a line is no plane",
            {0.0, 1.0});
   f.number("max_residual_m", c.max_residual_m, "farther planes do not explain a point", kPositive);
+  f.flag(
+      "nearest_leaves",
+      c.nearest_leaves,
+      "where no plane holds, as in foliage, a point may match one through the nearest leaf means; "
+      "it counts as little as it is thick");
   c.leaf_capacity = static_cast<std::size_t>(capacity);
+}
+
+void describe_ikd_map(IkdMapConfig& c, ConfigFields& f) {
+  f.number("voxel_m", c.voxel_m, "side of the voxels that hold one point each", kPositive);
+  f.number("max_neighbour_m",
+           c.max_neighbour_m,
+           "farthest of the five nearest points that make a plane",
+           kPositive);
+  f.number("max_plane_distance_m",
+           c.max_plane_distance_m,
+           "farther from the plane through all five, and there is none",
+           kPositive);
 }
 
 void describe_local_map(LocalMapConfig& c, ConfigFields& f) {
@@ -135,8 +153,15 @@ void describe_local_map(LocalMapConfig& c, ConfigFields& f) {
            "half the side of the cube around the robot that is kept",
            kPositive);
   f.number("prune_every_m", c.prune_every_m, "distance between two prunings", kPositive);
+  f.choice("kind",
+           c.kind,
+           "surfel_map: voxel hash of planes; ikd_tree: FAST-LIO2's incremental k-d tree",
+           {"surfel_map", "ikd_tree"});
   f.section("surfel", "two-level voxel hash with planes", [&](ConfigFields& s) {
     describe_surfel_map(c.surfel, s);
+  });
+  f.section("ikd", "points in an incremental k-d tree", [&](ConfigFields& s) {
+    describe_ikd_map(c.ikd, s);
   });
 }
 

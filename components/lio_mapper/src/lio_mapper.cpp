@@ -63,6 +63,12 @@ struct LioMapper::Impl {
         imu_rate(config.imu, config.imu_rate_odometry_hz),
         keyframe_trigger(config.keyframes) {}
 
+  void begin_stage(Stage stage) const {
+    if (observe) {
+      observe(stage);
+    }
+  }
+
   void queue(Sweep sweep, Output& output);
   void process_what_is_covered(Output& output);
   void start_when_possible(Output& output);
@@ -97,6 +103,7 @@ struct LioMapper::Impl {
   Nanoseconds newest_sweep_ns{0};
   Nanoseconds last_used_ns{0};
   Nanoseconds trouble_told_ns{0};
+  StageObserver observe;
 };
 
 void LioMapper::Impl::refuse_sweep(const std::string& reason,
@@ -179,7 +186,7 @@ void LioMapper::Impl::begin(Output& output) {
     refuse_front("imu_implausible", result.trouble->text, output);
     return;
   }
-  filter.emplace(config, T_base_lidar, result.initial);
+  filter.emplace(config, T_base_lidar, result.initial, [this](Stage stage) { begin_stage(stage); });
   last_used_ns = result.initial.stamp_ns;
   output.events.push_back(
       {Severity::kInfo,
@@ -211,11 +218,13 @@ void LioMapper::Impl::process_front(Output& output) {
     count_row(update, filter->apply(update), output);
   }
   filter->insert(outcome);
+  begin_stage(Stage::kReport);
   judge_health(outcome, sweep.end_ns, output);
   report(outcome, output);
   sweeps.pop_front();
   imu.forget_before(filter->stamp_ns());
   imu_rate.restart(*filter, imu);
+  begin_stage(Stage::kOutside);
 }
 
 void LioMapper::Impl::judge_health(const ScanOutcome& outcome,
@@ -386,7 +395,9 @@ Output LioMapper::on_imu(const ImuSample& sample) {
 Output LioMapper::on_cloud(const PointCloudMessage& cloud) {
   Output output;
   ++impl_->status.scans_received;
+  impl_->begin_stage(Stage::kDecode);
   auto decoded = impl_->decoder.decode(cloud, output.events);
+  impl_->begin_stage(Stage::kOutside);
   if (const auto* refusal = std::get_if<SweepRefusal>(&decoded)) {
     impl_->refuse_sweep(refusal->code, cloud.stamp_ns, refusal->text, output);
     return output;
@@ -419,6 +430,14 @@ Output LioMapper::finish() {
   }
   impl.refresh_status();
   return output;
+}
+
+void LioMapper::observe_stages(StageObserver observer) {
+  impl_->observe = std::move(observer);
+}
+
+std::size_t LioMapper::map_memory_bytes() const {
+  return impl_->filter ? impl_->filter->map().memory_bytes() : 0;
 }
 
 PointCloud LioMapper::local_map() const {

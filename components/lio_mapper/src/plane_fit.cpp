@@ -6,27 +6,14 @@
 
 namespace trigpoint::lio_mapper {
 
-void Moments::add(const Eigen::Vector3d& point) {
-  ++count;
-  sum += point;
-  outer.noalias() += point * point.transpose();
-}
-
-Moments& Moments::operator+=(const Moments& other) {
-  count += other.count;
-  sum += other.sum;
-  outer += other.outer;
-  return *this;
-}
-
 std::optional<PlaneFit> fit_plane(const Moments& moments) {
   if (moments.count < 3) {
     return std::nullopt;
   }
   const double n = moments.count;
   PlaneFit fit;
-  fit.centroid = moments.sum / n;
-  const Eigen::Matrix3d covariance = moments.outer / n - fit.centroid * fit.centroid.transpose();
+  fit.centroid = moments.sum.matrix() / n;
+  const Eigen::Matrix3d covariance = moments.outer() / n - fit.centroid * fit.centroid.transpose();
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
   solver.computeDirect(covariance);
   fit.eigenvalues = solver.eigenvalues().cwiseMax(0.0);

@@ -11,11 +11,33 @@ namespace trigpoint::lio_mapper {
 /// Sums of points, all of equal weight, from which their mean and covariance follow.
 struct Moments {
   int count{0};
-  Eigen::Vector3d sum{Eigen::Vector3d::Zero()};
-  Eigen::Matrix3d outer{Eigen::Matrix3d::Zero()};  ///< sum of p p^T
+  Eigen::Array3d sum{Eigen::Array3d::Zero()};
+  Eigen::Array3d squares{Eigen::Array3d::Zero()};   ///< sums of xx, yy, zz
+  Eigen::Array3d products{Eigen::Array3d::Zero()};  ///< sums of xy, yz, zx
 
-  void add(const Eigen::Vector3d& point);
-  Moments& operator+=(const Moments& other);
+  // Inline: the innermost loop of fitting.
+  void add(const Eigen::Vector3d& p) {
+    ++count;
+    sum += p.array();
+    squares += p.array() * p.array();
+    products += p.array() * Eigen::Array3d(p.y(), p.z(), p.x());
+  }
+
+  Moments& operator+=(const Moments& other) {
+    count += other.count;
+    sum += other.sum;
+    squares += other.squares;
+    products += other.products;
+    return *this;
+  }
+
+  /// Sum of p p^T.
+  Eigen::Matrix3d outer() const {
+    Eigen::Matrix3d m;
+    m << squares[0], products[0], products[2], products[0], squares[1], products[1], products[2],
+        products[1], squares[2];
+    return m;
+  }
 };
 
 struct PlaneFit {

@@ -9,6 +9,8 @@
 #include "undistortion.hpp"
 #include <Eigen/LU>
 
+#include <utility>
+
 namespace trigpoint::lio_mapper {
 
 using Eigen::Matrix3d;
@@ -84,11 +86,16 @@ void add_drift_noise(const DriftConfig& drift,
   covariance += tilt2 * tilt * tilt.transpose();
 }
 
-ScanFilter::ScanFilter(const Config& config, const Pose& T_base_lidar, const InitialState& initial)
+ScanFilter::ScanFilter(const Config& config,
+                       const Pose& T_base_lidar,
+                       const InitialState& initial,
+                       StageObserver observe)
     : config_(config),
       T_base_lidar_(T_base_lidar),
       initial_(initial),
-      map_(make_surfel_map(config.local_map.surfel)),
+      observe_(std::move(observe)),
+      workers_(std::make_unique<Workers>(static_cast<std::size_t>(config.matching.threads))),
+      map_(make_local_map(config.local_map)),
       history_(config.rows) {}
 
 Nanoseconds ScanFilter::stamp_ns() const {
@@ -142,11 +149,16 @@ void ScanFilter::add_drift(Prediction& prediction) {
 UpdateResult ScanFilter::match(const Prediction& prediction,
                                const PointCloud& thinned_base,
                                ScanOutcome& outcome) {
-  ScanMatcher matcher(thinned_base, *map_, T_base_lidar_.p, config_.matching);
+  ScanMatcher matcher(thinned_base, *map_, T_base_lidar_.p, config_.matching, *workers_);
   UpdateResult result = iterated_update(
       prediction.state,
       prediction.covariance,
-      [&](const Pose& T_odom_base) { return matcher.linearise(T_odom_base); },
+      [&](const Pose& T_odom_base) {
+        begin(Stage::kMatch);
+        const PoseInformation information = matcher.linearise(T_odom_base);
+        begin(Stage::kSolve);
+        return information;
+      },
       limits_of(config_.matching));
   outcome.used = result.used;
   outcome.matches = result.count;
@@ -156,16 +168,26 @@ UpdateResult ScanFilter::match(const Prediction& prediction,
   return result;
 }
 
+void ScanFilter::begin(Stage stage) const {
+  if (observe_) {
+    observe_(stage);
+  }
+}
+
 ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu) {
+  begin(Stage::kPredict);
   Prediction prediction = predict(sweep, imu);
   add_drift(prediction);
 
   ScanOutcome outcome;
+  begin(Stage::kUndistort);
   outcome.points_base = undistort(sweep, prediction.path, T_base_lidar_);
+  begin(Stage::kDownsample);
   outcome.thinned_base = downsample(outcome.points_base, config_.matching.voxel_m);
   outcome.points = outcome.thinned_base.size();
   outcome.first = map_->empty();
 
+  begin(Stage::kSolve);
   ScanRecord record;
   record.stamp_ns = sweep.end_ns;
   record.before_rows = prediction.state;
@@ -185,6 +207,7 @@ ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu) {
 }
 
 void ScanFilter::insert(const ScanOutcome& outcome) {
+  begin(Stage::kInsert);
   const Vector3d& p = state().T_odom_base.p;
   const double sigma2 = covariance().diagonal().head<3>().maxCoeff();
   if (outcome.used || sigma2 < kMapSigma_m * kMapSigma_m) {

@@ -4,12 +4,14 @@
 
 #include "trigpoint/base/measurements.hpp"
 #include "trigpoint/lio_mapper/config.hpp"
+#include "trigpoint/lio_mapper/stages.hpp"
 
 #include "imu_buffer.hpp"
 #include "iterated_update.hpp"
 #include "local_map.hpp"
 #include "row_history.hpp"
 #include "sweep.hpp"
+#include "workers.hpp"
 #include <Eigen/Core>
 
 #include <memory>
@@ -40,7 +42,11 @@ struct ScanOutcome {
 /// insert. One odom epoch; knows nothing of start-up, waiting or reporting.
 class ScanFilter {
  public:
-  ScanFilter(const Config& config, const Pose& T_base_lidar, const InitialState& initial);
+  /// `observe` may be empty.
+  ScanFilter(const Config& config,
+             const Pose& T_base_lidar,
+             const InitialState& initial,
+             StageObserver observe = {});
 
   /// `imu` covers the sweep's end.
   ScanOutcome process(const Sweep& sweep, const ImuBuffer& imu);
@@ -86,6 +92,7 @@ class ScanFilter {
 
   Prediction predict(const Sweep& sweep, const ImuBuffer& imu) const;
   void add_drift(Prediction& prediction);
+  void begin(Stage stage) const;
   UpdateResult match(const Prediction& prediction,
                      const PointCloud& thinned_base,
                      ScanOutcome& outcome);
@@ -93,6 +100,8 @@ class ScanFilter {
   Config config_;
   Pose T_base_lidar_;
   InitialState initial_;
+  StageObserver observe_;
+  std::unique_ptr<Workers> workers_;
   std::unique_ptr<LocalMap> map_;
   RowHistory history_;
   bool aligned_{false};

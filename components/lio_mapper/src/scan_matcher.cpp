@@ -18,17 +18,27 @@ constexpr double kRematchRotation_rad = 2e-3;
 constexpr double kGatePerRootRange = 1.0 / 9.0;
 /// Planes of few points look thinner than they are.
 constexpr double kLeastVariance_m2 = 0.01 * 0.01;
+/// Points that one thread takes at a time.
+constexpr std::size_t kBlock = 256;
+
+std::size_t blocks_of(std::size_t count) {
+  return (count + kBlock - 1) / kBlock;
+}
 
 }  // namespace
 
 ScanMatcher::ScanMatcher(const PointCloud& points_base,
                          const LocalMap& map,
                          const Vector3d& lidar_position_base_m,
-                         const MatchingConfig& config)
+                         const MatchingConfig& config,
+                         Workers& workers)
     : points_base_(points_base),
       map_(map),
       lidar_position_base_m_(lidar_position_base_m),
-      config_(config) {
+      config_(config),
+      workers_(workers),
+      slots_(points_base.size()),
+      has_match_(points_base.size()) {
   residuals_.reserve(points_base.size());
 }
 
@@ -37,24 +47,38 @@ bool ScanMatcher::must_match_again(const Pose& T_odom_base) const {
          T_odom_base.q.angularDistance(T_odom_base_matched_.q) > kRematchRotation_rad;
 }
 
+bool ScanMatcher::match_point(const PointXyzi& point,
+                              const Eigen::Matrix3d& R,
+                              const Vector3d& p,
+                              Residual& r) const {
+  r.point_base_m = point.position().cast<double>();
+  const Vector3d point_odom_m = R * r.point_base_m + p;
+  if (!map_.match(point_odom_m, r.plane)) {
+    return false;
+  }
+  const Vector3d beam_m = r.point_base_m - lidar_position_base_m_;
+  r.range_m = beam_m.norm();
+  r.residual_m = r.plane.normal.dot(point_odom_m) + r.plane.offset_m;
+  if (r.range_m < 1e-3 || std::abs(r.residual_m) > kGatePerRootRange * std::sqrt(r.range_m)) {
+    return false;
+  }
+  r.direction_base = beam_m / r.range_m;
+  return true;
+}
+
 void ScanMatcher::match(const Pose& T_odom_base) {
   const Eigen::Matrix3d R = T_odom_base.q.toRotationMatrix();
+  workers_.run(blocks_of(points_base_.size()), [&](std::size_t block) {
+    const std::size_t end = std::min((block + 1) * kBlock, points_base_.size());
+    for (std::size_t i = block * kBlock; i < end; ++i) {
+      has_match_[i] = match_point(points_base_[i], R, T_odom_base.p, slots_[i]) ? 1 : 0;
+    }
+  });
   residuals_.clear();
-  for (const PointXyzi& point : points_base_) {
-    Residual r;
-    r.point_base_m = point.position().cast<double>();
-    const Vector3d point_odom_m = R * r.point_base_m + T_odom_base.p;
-    if (!map_.match(point_odom_m, r.plane)) {
-      continue;
+  for (std::size_t i = 0; i < slots_.size(); ++i) {
+    if (has_match_[i] != 0) {
+      residuals_.push_back(slots_[i]);
     }
-    const Vector3d beam_m = r.point_base_m - lidar_position_base_m_;
-    r.range_m = beam_m.norm();
-    r.residual_m = r.plane.normal.dot(point_odom_m) + r.plane.offset_m;
-    if (r.range_m < 1e-3 || std::abs(r.residual_m) > kGatePerRootRange * std::sqrt(r.range_m)) {
-      continue;
-    }
-    r.direction_base = beam_m / r.range_m;
-    residuals_.push_back(r);
   }
   matched_ = true;
   T_odom_base_matched_ = T_odom_base;
@@ -68,13 +92,12 @@ double ScanMatcher::variance_m2(const Residual& r, double cos_incidence) const {
          r.plane.thickness2_m2;
 }
 
-PoseInformation ScanMatcher::linearise(const Pose& T_odom_base) {
-  if (must_match_again(T_odom_base)) {
-    match(T_odom_base);
-  }
+PoseInformation ScanMatcher::sum_of(std::size_t block, const Pose& T_odom_base) {
   const Eigen::Matrix3d R = T_odom_base.q.toRotationMatrix();
   PoseInformation sum;
-  for (Residual& r : residuals_) {
+  const std::size_t end = std::min((block + 1) * kBlock, residuals_.size());
+  for (std::size_t i = block * kBlock; i < end; ++i) {
+    Residual& r = residuals_[i];
     const Vector3d normal_base = R.transpose() * r.plane.normal;
     r.residual_m =
         normal_base.dot(r.point_base_m) + r.plane.normal.dot(T_odom_base.p) + r.plane.offset_m;
@@ -86,6 +109,22 @@ PoseInformation ScanMatcher::linearise(const Pose& T_odom_base) {
     h << r.plane.normal, r.point_base_m.cross(normal_base);
     sum.information.selfadjointView<Eigen::Lower>().rankUpdate(h, weight);
     sum.gradient += weight * r.residual_m * h;
+  }
+  return sum;
+}
+
+/// Block by block and the blocks in order, so that the sum has the same rounding on any number of
+/// threads.
+PoseInformation ScanMatcher::linearise(const Pose& T_odom_base) {
+  if (must_match_again(T_odom_base)) {
+    match(T_odom_base);
+  }
+  sums_.resize(blocks_of(residuals_.size()));
+  workers_.run(sums_.size(), [&](std::size_t block) { sums_[block] = sum_of(block, T_odom_base); });
+  PoseInformation sum;
+  for (const PoseInformation& part : sums_) {
+    sum.information += part.information;
+    sum.gradient += part.gradient;
   }
   sum.count = residuals_.size();
   const double scale =

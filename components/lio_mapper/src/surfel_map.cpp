@@ -8,6 +8,7 @@
 #include <limits>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
 namespace trigpoint::lio_mapper {
 namespace {
@@ -32,8 +33,23 @@ constexpr double kFaceBand = 0.1;
 /// ... namely when that leaf's mean is this near to the point across the face.
 constexpr double kSameSurface = 0.2;
 
+/// Where no plane holds: this many leaf means, the farthest within so many sides of a leaf.
+constexpr int kNearestLeaves = 5;
+constexpr double kNearestLeafReach = 2.0;
+
 /// (5 mm)^2: no LiDAR knows a surface better, however well the means agree.
 constexpr double kThicknessFloor2_m2 = 2.5e-5;
+
+/// Planes are fitted anew when a leaf has 1, 2, 3, 5, 8, 13, ... points: in between its mean moves
+/// by less than its own noise, and fitting is most of the map's cost.
+bool matters_to_planes(std::size_t count, std::size_t capacity) {
+  std::size_t a = 1;
+  std::size_t b = 2;
+  while (a < count) {
+    a = std::exchange(b, a + b);
+  }
+  return a == count || count == capacity;
+}
 
 constexpr int slot(int x, int y, int z) {
   return (x * kSide + y) * kSide + z;
@@ -103,12 +119,13 @@ SurfelMap::SurfelMap(const SurfelMapConfig& config)
 void SurfelMap::insert(const PointCloud& points_odom) {
   for (const PointXyzi& point : points_odom) {
     if (voxel_index_fits(point.x, point.y, point.z, inverse_leaf_per_m_)) {
-      insert_point(point);
+      insert_mean(point, 1);
     }
   }
 }
 
-void SurfelMap::insert_point(const PointXyzi& point) {
+/// `count` points whose mean this is.
+void SurfelMap::insert_mean(const PointXyzi& point, std::uint16_t count) {
   const VoxelIndex leaf = leaf_for(point.position().cast<double>());
   const VoxelIndex home{floor_div3(leaf.x), floor_div3(leaf.y), floor_div3(leaf.z)};
   Parent& parent = parents_[static_cast<std::size_t>(find_or_create(home))];
@@ -119,7 +136,10 @@ void SurfelMap::insert_point(const PointXyzi& point) {
   }
   leaf_count_ += parent.counts[i] == 0 ? 1 : 0;
   parent.occupied |= 1U << i;
-  const float share = 1.0F / static_cast<float>(++parent.counts[i]);
+  parent.counts[i] = static_cast<std::uint16_t>(
+      std::min<std::size_t>(parent.counts[i] + std::size_t{count}, config_.leaf_capacity));
+  const float share =
+      static_cast<float>(std::min(count, parent.counts[i])) / static_cast<float>(parent.counts[i]);
   const Eigen::Vector3f local = (point.position().cast<double>() - centre_of(parent)).cast<float>();
   LeafMean& mean = parent.means[i];
   mean.x += share * (local.x() - mean.x);
@@ -127,7 +147,9 @@ void SurfelMap::insert_point(const PointXyzi& point) {
   mean.z += share * (local.z() - mean.z);
   mean.intensity +=
       share * ((std::isfinite(point.intensity) ? point.intensity : 0.0F) - mean.intensity);
-  mark_dirty(parent, inner);
+  if (matters_to_planes(parent.counts[i], config_.leaf_capacity)) {
+    mark_dirty(parent, inner);
+  }
 }
 
 /// The leaf that a point belongs to. Where a surface runs along a face of the leaves, its noise
@@ -232,7 +254,8 @@ bool SurfelMap::match(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) co
   }
   double least_cost = std::numeric_limits<double>::infinity();
   Surfel scratch;
-  for (const ParentId id : candidates(point_odom_m)) {
+  const std::array<ParentId, 8> parents = candidates(point_odom_m);
+  for (const ParentId id : parents) {
     const Surfel* found = id == kNoParent ? nullptr : surfel(id, scratch);
     if (found == nullptr) {
       continue;
@@ -247,7 +270,57 @@ bool SurfelMap::match(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) co
       plane.thickness2_m2 = found->thickness2_m2;
     }
   }
-  return std::isfinite(least_cost);
+  return std::isfinite(least_cost) ||
+         (config_.nearest_leaves && match_nearest_leaves(point_odom_m, parents, plane));
+}
+
+/// Where no plane holds, as in foliage, the five nearest leaf means tell at least where most of it
+/// is. What they say counts as little as they are thick.
+bool SurfelMap::match_nearest_leaves(const Eigen::Vector3d& point_odom_m,
+                                     const std::array<ParentId, 8>& parents,
+                                     PlaneMatch& plane) const {
+  struct Near {
+    double distance2_m2{std::numeric_limits<double>::infinity()};
+    Eigen::Vector3d offset_m{Eigen::Vector3d::Zero()};  ///< from the point
+  };
+
+  std::array<Near, kNearestLeaves> nearest{};
+  for (const ParentId id : parents) {
+    if (id == kNoParent) {
+      continue;
+    }
+    const Parent& parent = parents_[static_cast<std::size_t>(id)];
+    const Eigen::Vector3d origin = centre_of(parent) - point_odom_m;
+    for (std::uint32_t left = parent.occupied; left != 0; left &= left - 1) {
+      const LeafMean& mean = parent.means[static_cast<std::size_t>(std::countr_zero(left))];
+      Near candidate{0.0, origin + Eigen::Vector3d(mean.x, mean.y, mean.z)};
+      candidate.distance2_m2 = candidate.offset_m.squaredNorm();
+      for (Near& slot : nearest) {
+        if (candidate.distance2_m2 < slot.distance2_m2) {
+          std::swap(candidate, slot);
+        }
+      }
+    }
+  }
+  const double farthest_m = kNearestLeafReach * config_.leaf_m;
+  if (!(nearest.back().distance2_m2 < farthest_m * farthest_m)) {
+    return false;
+  }
+  Moments moments;
+  for (const Near& near : nearest) {
+    moments.add(near.offset_m);
+  }
+  const auto fit = fit_plane(moments);
+  if (!fit || fit->linearity() < config_.min_linearity ||
+      std::abs(fit->normal.dot(fit->centroid)) > config_.max_residual_m) {
+    return false;
+  }
+  plane.normal = fit->normal;
+  plane.offset_m = -fit->normal.dot(fit->centroid + point_odom_m);
+  // Three degrees of freedom of the five went into the plane.
+  plane.thickness2_m2 =
+      fit->eigenvalues[0] * kNearestLeaves / (kNearestLeaves - 3) + kThicknessFloor2_m2;
+  return true;
 }
 
 /// The parent that holds the point, and those behind the faces that are near; kNoParent fills up.
@@ -436,6 +509,42 @@ void SurfelMap::erase_empty_parents() {
       neighbour = neighbour == kNoParent ? kNoParent : new_id[static_cast<std::size_t>(neighbour)];
     }
   }
+}
+
+// ---- Laying anew -----------------------------------------------------------------------------
+
+void SurfelMap::clear() {
+  parents_.clear();
+  surfels_.clear();
+  index_.clear();
+  leaf_count_ = 0;
+}
+
+void SurfelMap::transform(const Pose& T_new_old) {
+  const std::vector<Parent> old = std::exchange(parents_, {});
+  clear();
+  for (const Parent& parent : old) {
+    const Eigen::Vector3d centre = centre_of(parent);
+    for (std::uint32_t left = parent.occupied; left != 0; left &= left - 1) {
+      const auto i = static_cast<std::size_t>(std::countr_zero(left));
+      const LeafMean& mean = parent.means[i];
+      const Eigen::Vector3f p =
+          (T_new_old * (centre + Eigen::Vector3d(mean.x, mean.y, mean.z))).cast<float>();
+      if (voxel_index_fits(p.x(), p.y(), p.z(), inverse_leaf_per_m_)) {
+        insert_mean({p.x(), p.y(), p.z(), mean.intensity}, parent.counts[i]);
+      }
+    }
+  }
+}
+
+void SurfelMap::rebuild(const PointCloud& points_odom) {
+  clear();
+  insert(points_odom);
+}
+
+std::size_t SurfelMap::memory_bytes() const {
+  return parents_.capacity() * sizeof(Parent) + surfels_.capacity() * sizeof(Surfel) +
+         index_.bucket_count() * (sizeof(VoxelKey) + 2 * sizeof(ParentId));
 }
 
 PointCloud SurfelMap::points() const {

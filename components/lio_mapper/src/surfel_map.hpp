@@ -22,8 +22,8 @@ namespace trigpoint::lio_mapper {
 /// any other: the fit also sees the leaves of the neighbouring parents that touch this one, and a
 /// query near a face also looks behind it.
 ///
-/// A plane is a function of the leaves alone, not of who asked when, so threads that match at once
-/// all get the same bits.
+/// Between two insertions a plane is a function of the leaves alone, not of who asked first, so
+/// threads that match at once all get the same bits.
 class SurfelMap final : public LocalMap {
  public:
   explicit SurfelMap(const SurfelMapConfig& config);
@@ -31,11 +31,16 @@ class SurfelMap final : public LocalMap {
   bool match(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) const override;
   void insert(const PointCloud& points_odom) override;
   void prune(const Eigen::Vector3d& center_odom_m, double half_side_m) override;
+  /// Leaf means keep their weights; leaves are laid anew.
+  void transform(const Pose& T_new_old) override;
+  void rebuild(const PointCloud& points_odom) override;
   /// The means of the leaves, in the order of their parents' creation.
   PointCloud points() const override;
 
   /// Number of leaves.
   std::size_t size() const override { return leaf_count_; }
+
+  std::size_t memory_bytes() const override;
 
  private:
   using ParentId = std::int32_t;
@@ -79,7 +84,8 @@ class SurfelMap final : public LocalMap {
   ParentId find(const VoxelIndex& index) const;
   ParentId find_or_create(const VoxelIndex& index);
   void link(ParentId id);
-  void insert_point(const PointXyzi& point);
+  void clear();
+  void insert_mean(const PointXyzi& mean, std::uint16_t count);
   VoxelIndex leaf_for(const Eigen::Vector3d& point_odom_m) const;
   std::optional<Eigen::Vector3d> mean_of(const VoxelIndex& leaf) const;
   void mark_dirty(const Parent& parent, const VoxelIndex& leaf);
@@ -89,6 +95,9 @@ class SurfelMap final : public LocalMap {
 
   std::array<ParentId, 8> candidates(const Eigen::Vector3d& point_odom_m) const;
   const Surfel* surfel(ParentId id, Surfel& scratch) const;
+  bool match_nearest_leaves(const Eigen::Vector3d& point_odom_m,
+                            const std::array<ParentId, 8>& parents,
+                            PlaneMatch& plane) const;
   Surfel fit(const Parent& parent) const;
   Window window_of(const Parent& parent) const;
   std::optional<PlaneFit> plane_of(const Window& window) const;

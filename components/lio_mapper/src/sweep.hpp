@@ -2,15 +2,15 @@
 // Copyright the Trigpoint developers
 #pragma once
 
+#include "trigpoint/base/event.hpp"
+#include "trigpoint/base/measurements.hpp"
+#include "trigpoint/lio_mapper/config.hpp"
+
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <variant>
 #include <vector>
-
-#include "trigpoint/base/event.hpp"
-#include "trigpoint/base/measurements.hpp"
-#include "trigpoint/lio_mapper/config.hpp"
 
 namespace trigpoint::lio_mapper {
 
@@ -31,7 +31,8 @@ struct Sweep {
   std::size_t points_refused{0};  ///< not finite or out of range
 };
 
-/// Why a cloud was refused: a short stable code and a sentence with field, value and what was expected.
+/// Why a cloud was refused: a short stable code and a sentence with field, value and what was
+/// expected.
 struct SweepRefusal {
   std::string code;
   std::string text;

@@ -179,10 +179,19 @@ class RoomMap final : public LocalMap {
 
   void prune(const Eigen::Vector3d&, double) override {}
 
+  void transform(const Pose&) override {}
+
+  void rebuild(const PointCloud&) override {}
+
+  std::size_t memory_bytes() const override { return 0; }
+
   PointCloud points() const override { return {}; }
 
   std::size_t size() const override { return 1; }
 };
+
+/// One thread; that more change nothing has a test of its own.
+Workers workers(1);
 
 TEST(ScanMatcher, gradient_and_information_are_the_derivatives_of_the_cost) {
   PointCloud points;
@@ -199,7 +208,7 @@ TEST(ScanMatcher, gradient_and_information_are_the_derivatives_of_the_cost) {
   config.range_sigma_m = 0.02;
   config.angle_sigma_rad = 0.0;
   const Pose T{so3_exp({0.01, -0.02, 0.015}), {0.02, -0.03, 0.01}};
-  ScanMatcher matcher(points, map, Eigen::Vector3d::Zero(), config);
+  ScanMatcher matcher(points, map, Eigen::Vector3d::Zero(), config, workers);
   const PoseInformation info = matcher.linearise(T);
   EXPECT_EQ(info.count, points.size());
 
@@ -235,10 +244,35 @@ TEST(ScanMatcher, many_residuals_weigh_as_much_as_the_independent_ones_only) {
   const RoomMap map;
   MatchingConfig config;
   config.independent_residuals = 300.0;
-  ScanMatcher all(points, map, Eigen::Vector3d::Zero(), config);
+  ScanMatcher all(points, map, Eigen::Vector3d::Zero(), config, workers);
   points.resize(300);
-  ScanMatcher few(points, map, Eigen::Vector3d::Zero(), config);
+  ScanMatcher few(points, map, Eigen::Vector3d::Zero(), config, workers);
   EXPECT_NEAR(all.linearise({}).information(0, 0) / few.linearise({}).information(0, 0), 1.0, 1e-9);
+}
+
+TEST(ScanMatcher, sums_to_the_same_bits_on_any_number_of_threads) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> place(-9.0F, 12.0F);
+  PointCloud points;
+  for (int i = 0; i < 30000; ++i) {
+    points.push_back({place(random), place(random), 0.2F * place(random), 0.0F});
+  }
+  const RoomMap map;
+  const MatchingConfig config;
+  const Pose T{so3_exp({0.01, -0.02, 0.015}), {0.02, -0.03, 0.01}};
+  ScanMatcher alone(points, map, Eigen::Vector3d::Zero(), config, workers);
+  const PoseInformation expected = alone.linearise(T);
+  ASSERT_GT(expected.count, 1000U);
+  for (const std::size_t threads : {2U, 3U, 7U}) {
+    Workers several(threads);
+    for (int run = 0; run < 20; ++run) {
+      ScanMatcher matcher(points, map, Eigen::Vector3d::Zero(), config, several);
+      const PoseInformation info = matcher.linearise(T);
+      ASSERT_EQ(info.count, expected.count);
+      ASSERT_EQ(info.information, expected.information);
+      ASSERT_EQ(info.gradient, expected.gradient);
+    }
+  }
 }
 
 }  // namespace

@@ -270,6 +270,77 @@ TEST(SurfelMap, sees_no_plane_in_a_filled_volume) {
   EXPECT_EQ(matched, 0);
 }
 
+TEST(SurfelMap, matches_foliage_by_its_nearest_leaves_and_says_how_thick_it_is) {
+  SurfelMapConfig config;
+  config.nearest_leaves = true;
+  const auto map = make_surfel_map(config);
+  PointCloud blob;
+  for (const Eigen::Vector3d& p : random_points(40000, 3.0, 11)) {
+    blob.push_back(point_of(p));
+  }
+  map->insert(blob);
+  map->insert(ground(-8.0, 14));
+  int matched = 0;
+  double thickness2_m2 = 0.0;
+  for (const Eigen::Vector3d& p : random_points(1000, 2.0, 12)) {
+    PlaneMatch plane;
+    if (map->match(p, plane)) {
+      ++matched;
+      thickness2_m2 += plane.thickness2_m2;
+    }
+  }
+  EXPECT_GT(matched, 500);
+  // Leaf means lie on a 0.5 m grid: a plane through five of them in space is decimetres thick.
+  EXPECT_GT(thickness2_m2 / matched, 0.1 * 0.1);
+  // Where a plane holds it stays the answer.
+  const auto without = make_surfel_map({});
+  without->insert(ground(-8.0, 14));
+  PlaneMatch plane;
+  PlaneMatch expected;
+  ASSERT_TRUE(map->match({0.3, 0.3, -7.9}, plane));
+  ASSERT_TRUE(without->match({0.3, 0.3, -7.9}, expected));
+  EXPECT_EQ(plane.normal, expected.normal);
+}
+
+/// Where the surfaces are, whatever the leaves: heights of the ground under a grid of places.
+TEST(SurfelMap, is_moved_as_a_whole_and_keeps_its_surfaces_and_weights) {
+  const auto map = make_surfel_map({});
+  map->insert(ground(0.75, 15));
+  const std::size_t leaves = map->size();
+  const Pose T_new_old(Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitZ())),
+                       {103.3, -20.2, 4.0});
+  map->transform(T_new_old);
+  EXPECT_NEAR(static_cast<double>(map->size()),
+              static_cast<double>(leaves),
+              0.25 * static_cast<double>(leaves));
+  constexpr double kSame_m = 0.01;
+  for (double x = -8.0; x < 8.0; x += 1.3) {
+    PlaneMatch plane;
+    const Eigen::Vector3d p = T_new_old * Eigen::Vector3d(x, 0.5 * x, 0.75);
+    ASSERT_TRUE(map->match(p, plane));
+    EXPECT_NEAR(plane.normal.dot(p) + plane.offset_m, 0.0, kSame_m);
+  }
+  // Full leaves stay frozen: one more layer above them hardly moves them.
+  map->insert(ground(4.75 + 0.1, 16));
+  PlaneMatch plane;
+  const Eigen::Vector3d p = T_new_old * Eigen::Vector3d(0.0, 0.0, 0.75);
+  ASSERT_TRUE(map->match(p, plane));
+  EXPECT_NEAR(plane.normal.dot(p) + plane.offset_m, 0.0, kSame_m);
+}
+
+TEST(SurfelMap, begins_anew_from_other_points) {
+  const auto map = make_surfel_map({});
+  map->insert(ground(0.75, 17));
+  map->rebuild(ground(5.2, 18));
+  const auto fresh = make_surfel_map({});
+  fresh->insert(ground(5.2, 18));
+  EXPECT_EQ(map->size(), fresh->size());
+  PlaneMatch plane;
+  EXPECT_FALSE(map->match({0.3, 0.3, 0.75}, plane));
+  EXPECT_TRUE(map->match({0.3, 0.3, 5.2}, plane));
+  EXPECT_GT(map->memory_bytes(), 0U);
+}
+
 TEST(SurfelMap, gives_no_plane_that_is_farther_than_the_limit) {
   const auto map = make_surfel_map({});
   map->insert(ground(0.75, 13));

@@ -34,6 +34,13 @@ struct SurfelMapConfig {
   double max_flatness{0.03};      ///< smallest over largest eigenvalue of a plane's leaf means
   double min_linearity{0.1};      ///< middle over largest eigenvalue, so that a line is no plane
   double max_residual_m{0.5};     ///< farther planes do not explain a point
+  bool nearest_leaves{false};     ///< where no plane holds: one through the nearest leaf means
+};
+
+struct IkdMapConfig {
+  double voxel_m{0.5};               ///< one point a voxel
+  double max_neighbour_m{2.236};     ///< farthest of the five points that make a plane
+  double max_plane_distance_m{0.1};  ///< of each of them from it
 };
 
 /// Noise of the IMU as the filter sees it: vibration and scale errors included, so larger than a
@@ -67,13 +74,16 @@ struct MatchingConfig {
   std::int64_t max_iterations{5};
   double converged_position_m{1e-3};
   double converged_rotation_rad{1e-4};
+  std::int64_t threads{2};   ///< that match; the result is the same for any number
   double lost_after_s{2.0};  ///< coasting longer than this is LOST
 };
 
 struct LocalMapConfig {
   double half_side_m{150.0};  ///< of the cube around the robot that is kept
   double prune_every_m{10.0};
+  std::string kind{"surfel_map"};  ///< surfel_map | ikd_tree
   SurfelMapConfig surfel;
+  IkdMapConfig ikd;
 };
 
 /// How fast odom drifts away from the truth: random walk of T_map_odom per metre driven.

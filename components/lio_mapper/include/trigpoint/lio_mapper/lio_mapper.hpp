@@ -7,6 +7,7 @@
 #include "trigpoint/base/messages.hpp"
 #include "trigpoint/base/robot.hpp"
 #include "trigpoint/lio_mapper/config.hpp"
+#include "trigpoint/lio_mapper/stages.hpp"
 
 #include <cstdint>
 #include <memory>
@@ -58,6 +59,12 @@ class LioMapper {
   Output on_state_update(const StateUpdate& update);
   /// Processes what waits for IMU samples that will not come (end of a log).
   Output finish();
+
+  /// Tells what it is doing, from the next input on; for benchmarks.
+  void observe_stages(StageObserver observer);
+
+  /// Of the local map.
+  std::size_t map_memory_bytes() const;
 
   /// The points of the local map, in odom.
   PointCloud local_map() const;

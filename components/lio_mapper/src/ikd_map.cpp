@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "ikd_map.hpp"
+
+#include "plane_fit.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace trigpoint::lio_mapper {
+
+using Eigen::Vector3d;
+
+namespace {
+
+constexpr std::size_t kPlanePoints = 5;
+/// (5 mm)^2, as in the surfel map: no LiDAR knows a surface better.
+constexpr double kThicknessFloor2_m2 = 2.5e-5;
+/// A line through the points lets the plane turn about it (middle over largest spread).
+constexpr double kLeastLinearity = 0.01;
+
+}  // namespace
+
+IkdMap::IkdMap(const IkdMapConfig& config) : config_(config) {}
+
+bool IkdMap::match(const Vector3d& point_odom_m, PlaneMatch& plane) const {
+  std::array<IkdTree::Neighbour, kPlanePoints> found;
+  const std::size_t count =
+      tree_.nearest(point_odom_m.cast<float>(), static_cast<float>(config_.max_neighbour_m), found);
+  if (count < kPlanePoints) {
+    return false;
+  }
+  // About the nearest one, so that nothing is lost far from the origin.
+  const Vector3d origin = found[0].position_m.cast<double>();
+  Moments moments;
+  for (const IkdTree::Neighbour& neighbour : found) {
+    moments.add(neighbour.position_m.cast<double>() - origin);
+  }
+  const auto fit = fit_plane(moments);
+  if (!fit || fit->linearity() < kLeastLinearity) {
+    return false;
+  }
+  const Vector3d centroid_m = fit->centroid + origin;
+  const bool flat =
+      std::all_of(found.begin(), found.end(), [&](const IkdTree::Neighbour& neighbour) {
+        const Vector3d from_centroid_m = neighbour.position_m.cast<double>() - centroid_m;
+        return std::abs(fit->normal.dot(from_centroid_m)) < config_.max_plane_distance_m;
+      });
+  if (!flat) {
+    return false;
+  }
+  plane.normal = fit->normal;
+  plane.offset_m = -fit->normal.dot(centroid_m);
+  // Three of the five degrees of freedom went into the plane.
+  constexpr double kUnbiased = static_cast<double>(kPlanePoints) / (kPlanePoints - 3.0);
+  plane.thickness2_m2 = kUnbiased * fit->eigenvalues[0] + kThicknessFloor2_m2;
+  return true;
+}
+
+void IkdMap::insert(const PointCloud& points_odom) {
+  tree_.insert_thinned(points_odom, static_cast<float>(config_.voxel_m));
+}
+
+void IkdMap::prune(const Vector3d& center_odom_m, double half_side_m) {
+  const Vector3d half = Vector3d::Constant(half_side_m);
+  tree_.erase_outside(
+      IkdTree::Box((center_odom_m - half).cast<float>(), (center_odom_m + half).cast<float>()));
+}
+
+void IkdMap::transform(const Pose& T_new_old) {
+  PointCloud moved = tree_.points();
+  for (PointXyzi& point : moved) {
+    const Vector3d p = T_new_old * point.position().cast<double>();
+    point = {static_cast<float>(p.x()),
+             static_cast<float>(p.y()),
+             static_cast<float>(p.z()),
+             point.intensity};
+  }
+  tree_.build(moved);
+}
+
+void IkdMap::rebuild(const PointCloud& points_odom) {
+  tree_.build({});
+  insert(points_odom);
+}
+
+std::unique_ptr<LocalMap> make_ikd_map(const IkdMapConfig& config) {
+  return std::make_unique<IkdMap>(config);
+}
+
+}  // namespace trigpoint::lio_mapper
