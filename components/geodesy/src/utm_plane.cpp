@@ -85,13 +85,18 @@ std::optional<Vector3d> UtmPlane::to_map(const Geographic& place) const {
   const double bend = 0.5 * length * (*to_left - *to_right) / (2.0 * kDerivativeStep_m);
   // True axes: clockwise by the convergence, which counts clockwise from true to grid north.
   const Vector2d direction = turned(along, bend - origin_.convergence_deg * kDegree);
-  // Euler's radius of curvature in this direction; up there both ends are lifted by their heights.
+  // On the ellipsoid an arc with Euler's radius of curvature in this direction; from its end up
+  // along the vertical there, which leans by each axis' own curvature.
   const double radius =
       1.0 / (square(direction.y()) / meridian_radius_m_ + square(direction.x()) / normal_radius_m_);
   const double angle = s / radius;
+  const double bow = 2.0 * square(std::sin(0.5 * angle));
+  const Vector2d lean =
+      radius * std::sin(angle) *
+      Vector2d(direction.x() / normal_radius_m_, direction.y() / meridian_radius_m_);
   Vector3d position;
-  position << (radius + utm->height_m) * std::sin(angle) * direction,
-      rise - (radius + utm->height_m) * 2.0 * square(std::sin(0.5 * angle));
+  position << radius * std::sin(angle) * direction + utm->height_m * lean,
+      rise - radius * bow - 0.5 * utm->height_m * lean.squaredNorm();
   return position;
 }
 

@@ -214,6 +214,32 @@ void update_velocity(Ekf15& filter, const Vector3d& velocity_base_mps, const Vec
   update<3>(filter, innovation, H, sigma_mps.cwiseAbs2().asDiagonal());
 }
 
+Vector3d point_velocity(const Vector15d& x, const Vector3d& point_base_m) {
+  return x.segment<3>(kVelocity) + x.segment<3>(kRate).cross(point_base_m);
+}
+
+Eigen::Matrix<double, 3, 15> point_velocity_jacobian(const Vector3d& point_base_m) {
+  Eigen::Matrix<double, 3, 15> H = Eigen::Matrix<double, 3, 15>::Zero();
+  H.block<3, 3>(0, kVelocity).setIdentity();
+  H.block<3, 3>(0, kRate) = -hat(point_base_m);
+  return H;
+}
+
+void update_point_velocity(Ekf15& filter,
+                           const Vector3d& velocity_base_mps,
+                           const Matrix3d& covariance_m2ps2,
+                           const Vector3d& point_base_m) {
+  const Vector3d innovation = velocity_base_mps - point_velocity(filter.x, point_base_m);
+  update<3>(filter, innovation, point_velocity_jacobian(point_base_m), covariance_m2ps2);
+}
+
+void update_yaw(Ekf15& filter, double yaw_rad, double sigma_rad) {
+  Eigen::Matrix<double, 1, 15> H = Eigen::Matrix<double, 1, 15>::Zero();
+  H(kAttitude + 2) = 1.0;
+  const Eigen::Matrix<double, 1, 1> innovation(wrap_angle(yaw_rad - filter.x(kAttitude + 2)));
+  update<1>(filter, innovation, H, Eigen::Matrix<double, 1, 1>(sigma_rad * sigma_rad));
+}
+
 void reset_block(Ekf15& filter, int first, const Matrix3d& covariance) {
   filter.P.middleRows<3>(first).setZero();
   filter.P.middleCols<3>(first).setZero();

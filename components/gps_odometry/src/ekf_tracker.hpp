@@ -34,6 +34,8 @@ class EkfTracker {
 
   void apply(EkfTrack& track, const CheckedImu& imu) const;
   FixOutcome apply(EkfTrack& track, const MapFix& fix) const;
+  FixOutcome apply(EkfTrack& track, const CheckedTwist& twist) const;
+  FixOutcome apply(EkfTrack& track, const CheckedYaw& yaw) const;
 
   /// Position of base_link with covariance as it may be published, order x y z roll pitch yaw about
   /// the axes of map.
@@ -63,6 +65,8 @@ class EkfTracker {
   void advance(EkfTrack& track, Nanoseconds stamp_ns) const;
   MotionNoise noise(const EkfTrack& track) const;
 
+  CoursePoint course_point(const EkfTrack& track, const MapFix& fix) const;
+  void prove_heading(EkfTrack& track, const MapFix& fix) const;
   FixOutcome align(EkfTrack& track, const MapFix& fix) const;
   void begin_running(EkfTrack& track, const MapFix& fix, const HeadingEstimate& heading) const;
   FixOutcome filter_fix(EkfTrack& track, const MapFix& fix) const;
@@ -80,6 +84,7 @@ class EkfTracker {
   Eigen::Vector3d lever_base_m_;
   double gate2_;  ///< chi-square limit, 2 degrees of freedom
   double gate1_;  ///< 1 degree of freedom
+  double gate3_;  ///< 3 degrees of freedom
 };
 
 }  // namespace trigpoint::gps_odometry

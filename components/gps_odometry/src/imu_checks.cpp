@@ -94,7 +94,15 @@ ImuChecks::ImuChecks(const Config& config, const Eigen::Quaterniond& q_base_imu)
       rest_(config),
       previous_(Eigen::Matrix<double, 6, 1>::Constant(kNaN)) {}
 
+void ImuChecks::condemn(const std::string& reason, const std::string& text) {
+  fault_ = reason;
+  condemned_text_ = text;
+}
+
 ImuVerdict ImuChecks::check(const ImuSample& sample) {
+  if (!condemned_text_.empty()) {
+    return {std::nullopt, fault_, condemned_text_, false};
+  }
   if (!sample.gyro_radps.allFinite() || !sample.accel_mps2.allFinite()) {
     return refuse(
         "imu_not_finite", "IMU sample refused: a value is %g, expected finite numbers.", kNaN);

@@ -44,7 +44,8 @@ InsTracker::InsTracker(const Config& config, const Vector3d& lever_base_m)
       lever_base_m_(lever_base_m),
       gate_{chi_square_limit_2(config.gate_probability),
             chi_square_limit_1(config.gate_probability)},
-      gate_axis_(chi_square_limit_1(config.gate_probability)) {}
+      gate_axis_(chi_square_limit_1(config.gate_probability)),
+      gate3_(chi_square_limit_3(config.gate_probability)) {}
 
 // ---- IMU ----------------------------------------------------------------------------------------
 
@@ -63,6 +64,7 @@ void InsTracker::start(InsTrack& track, const CheckedImu& imu) const {
       Vector3d::Ones();
   track.filter.P = sigma.cwiseAbs2().asDiagonal();
   track.heading.restart();
+  track.aiding = AidingState{};
   // The IMU's clock may have moved: what was stamped before says nothing any more.
   track.no_side_slip_ns = track.doubt_until_ns = 0;
   track.parts = {};
@@ -195,7 +197,7 @@ void InsTracker::constrain(InsTrack& track, const CheckedImu& imu) const {
     return;
   }
   const double speed = track.filter.v_map_mps.norm();
-  if (c.no_side_slip && speed > c.no_side_slip_speed_mps &&
+  if (c.no_side_slip && !track.aiding.heading_unproven && speed > c.no_side_slip_speed_mps &&
       filter_yaw_sigma_rad(track) < c.no_side_slip_yaw_sigma_rad) {
     track.no_side_slip_ns = imu.stamp_ns;
     const double sigma = std::hypot(c.no_side_slip_sigma_mps, c.no_side_slip_share * speed);
@@ -318,6 +320,7 @@ void InsTracker::change_frame(InsTrack& track,
   track.accepted_covariance_map_m2 =
       R_new_old * track.accepted_covariance_map_m2 * R_new_old.transpose();
   move(track.refused.last_map_m);
+  track.aiding.prior_yaw_map_relative_rad += std::atan2(R_new_old(1, 0), R_new_old(0, 0));
   for (Contradiction& part : track.parts) {
     move(part.streak.last_map_m);
   }

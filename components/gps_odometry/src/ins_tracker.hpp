@@ -35,7 +35,8 @@ struct InsTrack : Track {
   /// The same with the heading turned round, until the data decide (a start in reverse).
   Eskf18 rival;
   bool has_rival{false};
-  double log_ratio{0.0};  ///< of the likelihoods, filter to rival
+  double log_ratio{0.0};    ///< of the likelihoods, filter to rival
+  bool yaw_weighed{false};  ///< a heading that was heard has been weighed between them
 
   Eigen::Vector3d fix_variance_m2{Eigen::Vector3d::Zero()};   ///< of the newest fix; 0: none yet
   Eigen::Vector3d held_variance_m2{Eigen::Vector3d::Zero()};  ///< peak hold of it
@@ -55,6 +56,8 @@ class InsTracker {
 
   void apply(InsTrack& track, const CheckedImu& imu) const;
   FixOutcome apply(InsTrack& track, const MapFix& fix) const;
+  FixOutcome apply(InsTrack& track, const CheckedTwist& twist) const;
+  FixOutcome apply(InsTrack& track, const CheckedYaw& yaw) const;
 
   Estimate estimate(const InsTrack& track) const;
 
@@ -88,6 +91,11 @@ class InsTracker {
   bool is_saturated(const CheckedImu& imu) const;
   bool is_at_rest(const InsTrack& track, const QuietWindow& quiet) const;
   void constrain(InsTrack& track, const CheckedImu& imu) const;
+
+  // ins_aiding.cpp: optional inputs.
+  void weigh_yaw(InsTrack& track, const CheckedYaw& yaw) const;
+  CoursePoint course_point(const InsTrack& track, const MapFix& fix) const;
+  void prove_heading(InsTrack& track, const MapFix& fix) const;
 
   // ins_fixes.cpp: fixes and heading.
   FixOutcome align(InsTrack& track, const MapFix& fix) const;
@@ -129,6 +137,7 @@ class InsTracker {
   Eigen::Vector3d lever_base_m_;
   std::array<double, 2> gate_;  ///< chi-square limits, by part
   double gate_axis_;            ///< 1 degree of freedom
+  double gate3_;                ///< 3 degrees of freedom
 };
 
 }  // namespace trigpoint::gps_odometry

@@ -17,6 +17,7 @@ namespace {
 
 constexpr double kMillimetre = 1e-3;
 constexpr double kKilometre_m = 1000.0;
+constexpr double kUtmEnd_deg = 84.0;
 
 Datum datum_at(const Geographic& place) {
   return {place.latitude_deg, place.longitude_deg, place.height_m, 0};
@@ -43,6 +44,9 @@ class UtmPlaces : public testing::TestWithParam<Geographic> {
     double worst = 0.0;
     for (int i = 0; i < 16; ++i) {
       const Geographic place = at(GetParam(), distance_m, 22.5 * i, 5.0 * i - 40.0);
+      if (std::abs(place.latitude_deg) > kUtmEnd_deg) {
+        continue;
+      }
       const auto through_utm = utm.to_map(place);
       EXPECT_TRUE(through_utm.has_value());
       worst = std::max(worst, (through_utm.value() - enu.to_map(place).value()).norm());
@@ -56,9 +60,8 @@ TEST_P(UtmPlaces, give_the_same_map_within_a_millimetre_at_a_kilometre) {
   EXPECT_LT(worst_m(100.0), kMillimetre);
 }
 
-TEST_P(UtmPlaces, give_the_same_map_within_centimetres_at_ten_kilometres) {
-  constexpr double kCentimetres = 0.03;
-  EXPECT_LT(worst_m(10.0 * kKilometre_m), kCentimetres);
+TEST_P(UtmPlaces, give_the_same_map_within_a_millimetre_at_ten_kilometres) {
+  EXPECT_LT(worst_m(10.0 * kKilometre_m), kMillimetre);
 }
 
 TEST_P(UtmPlaces, keep_distance_and_azimuth_of_the_geodesic) {
