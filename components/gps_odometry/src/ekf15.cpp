@@ -37,7 +37,12 @@ void update(Ekf15& filter,
             const Eigen::Matrix<double, M, M>& R) {
   const Eigen::Matrix<double, 15, M> PHt = filter.P * H.transpose();
   const Eigen::Matrix<double, M, M> S = H * PHt + R;
-  const Eigen::Matrix<double, 15, M> K = S.ldlt().solve(PHt.transpose()).transpose();
+  Eigen::Matrix<double, 15, M> K;
+  if constexpr (M == 1) {
+    K = PHt / S.value();
+  } else {
+    K = S.ldlt().solve(PHt.transpose()).transpose();
+  }
   filter.x += K * innovation;
   for (int i = 0; i < 3; ++i) {
     filter.x(kAttitude + i) = wrap_angle(filter.x(kAttitude + i));

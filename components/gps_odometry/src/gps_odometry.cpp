@@ -6,16 +6,14 @@
 #include "trigpoint/base/so3.hpp"
 #include "trigpoint/geodesy/local_frame.hpp"
 
+#include "admission.hpp"
 #include "aiding.hpp"
-#include "clock_offset.hpp"
 #include "counters.hpp"
 #include "datum_election.hpp"
 #include "filter.hpp"
 #include "fix_checks.hpp"
 #include "imu_checks.hpp"
-#include "place_checks.hpp"
 #include "status.hpp"
-#include "turn_check.hpp"
 
 #include <cmath>
 
@@ -45,18 +43,6 @@ geodesy::Geographic place_of(const Datum& datum) {
   return {datum.latitude_deg, datum.longitude_deg, datum.height_m};
 }
 
-bool has_utm(const geodesy::Geographic& place) {
-  return geodesy::to_utm(place,
-                         geodesy::utm_zone_of({place.latitude_deg, place.longitude_deg, 0.0, 0}))
-      .has_value();
-}
-
-/// By the configured projection; beyond the end of UTM by the tangent plane, which is the same map.
-geodesy::LocalFrame make_frame(const Datum& datum, const Config& config) {
-  const bool utm = config.projection == "utm" && has_utm(place_of(datum));
-  return geodesy::LocalFrame(datum, utm ? geodesy::Projection::kUtm : geodesy::Projection::kEnu);
-}
-
 }  // namespace
 
 struct GpsOdometry::Impl {
@@ -66,11 +52,7 @@ struct GpsOdometry::Impl {
         imu_checks(c, robot.q_base_imu()),
         filter(make_filter(c, robot)),
         election(c),
-        clock(c),
-        distance(c),
-        imu_frames(robot.imu_frame_ids),
-        fix_frames(robot.fix_frame_ids),
-        twist_frames(robot.twist_frame_ids),
+        admission(c, robot),
         geoid_undulation_m(robot.geoid_undulation_m) {
     if (datum) {
       frame.emplace(make_frame(*datum, config));
@@ -81,27 +63,20 @@ struct GpsOdometry::Impl {
   void take_fix(const GnssFix& message, Output& output);
   std::optional<CheckedFix> checked(const GnssFix& message, Output& output);
   bool is_untimely(const CheckedFix& fix, Output& output);
-  bool is_in_known_frame(FrameIds& frames,
-                         const std::string& frame_id,
-                         const std::string& reason,
-                         Nanoseconds stamp_ns,
-                         Output& output);
-  bool put_on_imu_clock(CheckedFix& fix, Output& output);
-  bool is_misplaced(const CheckedFix& fix, Output& output);
+  bool is_refused(const std::optional<Refusal>& refusal, Nanoseconds stamp_ns, Output& output);
   void compare_turns(const MapFix& fix, Output& output);
   template <typename Checked>
   void take_aiding(const AidingVerdict<Checked>& verdict,
                    const std::string& kind,
                    Nanoseconds stamp_ns,
                    Output& output);
-  void tell_projection(Output& output) const;
   void refuse(const std::string& reason,
               const std::string& text,
               Nanoseconds stamp_ns,
               Output& output);
   MapFix place(const CheckedFix& fix) const;
   void elect(const CheckedFix& fix, Output& output);
-  void move_to(const Datum& new_datum);
+  void move_to(const Datum& new_datum, Output& output);
   void publish_odometry(Output& output);
   Odometry odometry() const;
   GpsStatus status() const;
@@ -115,13 +90,7 @@ struct GpsOdometry::Impl {
   std::unique_ptr<Filter> filter;
   DatumElection election;
   FrozenReceiver frozen;
-  ClockOffset clock;
-  DatumDistance distance;
-  HeightReference height_reference;
-  TurnCheck turns;
-  FrameIds imu_frames;
-  FrameIds fix_frames;
-  FrameIds twist_frames;
+  Admission admission;
   double geoid_undulation_m;
   Counters counters;
   std::uint64_t fixes_received{0};
@@ -149,8 +118,7 @@ void GpsOdometry::Impl::refuse(const std::string& reason,
 
 void GpsOdometry::Impl::take_imu(const ImuSample& sample, Output& output) {
   ++imu_received;
-  if (!is_in_known_frame(
-          imu_frames, sample.frame_id, "imu_unknown_frame", sample.stamp_ns, output)) {
+  if (is_refused(admission.check_frame(Source::kImu, sample.frame_id), sample.stamp_ns, output)) {
     return;
   }
   const ImuVerdict verdict = imu_checks.check(sample);
@@ -169,7 +137,8 @@ void GpsOdometry::Impl::take_imu(const ImuSample& sample, Output& output) {
     now_ns = filter->newest_imu_ns() ? std::max(now_ns, sample.stamp_ns) : sample.stamp_ns;
     fixes_ahead = 0;
     filter->insert(*verdict.sample);
-    turns.add_imu(sample.stamp_ns, verdict.sample->raw_gyro_radps, verdict.sample->mean_accel_mps2);
+    admission.turns.add_imu(
+        sample.stamp_ns, verdict.sample->raw_gyro_radps, verdict.sample->mean_accel_mps2);
     publish_odometry(output);
   }
   if (!status_ns || now_ns - *status_ns >= kStatusInterval_ns) {
@@ -181,7 +150,7 @@ void GpsOdometry::Impl::take_imu(const ImuSample& sample, Output& output) {
 // ---- fixes --------------------------------------------------------------------------------------
 
 std::optional<CheckedFix> GpsOdometry::Impl::checked(const GnssFix& message, Output& output) {
-  if (!is_in_known_frame(fix_frames, message.frame_id, "unknown_frame", message.stamp_ns, output)) {
+  if (is_refused(admission.check_frame(Source::kFix, message.frame_id), message.stamp_ns, output)) {
     return std::nullopt;
   }
   GnssFix above_ellipsoid = message;
@@ -190,8 +159,16 @@ std::optional<CheckedFix> GpsOdometry::Impl::checked(const GnssFix& message, Out
   if (!verdict.reason.empty()) {
     refuse(verdict.reason, verdict.text, message.stamp_ns, output);
   }
-  if (!verdict.fix || !put_on_imu_clock(*verdict.fix, output) ||
-      is_untimely(*verdict.fix, output) || is_misplaced(*verdict.fix, output)) {
+  if (!verdict.fix ||
+      is_refused(
+          admission.check_clock(*verdict.fix, filter->newest_imu_ns(), fixes_ahead, output.events),
+          message.stamp_ns,
+          output) ||
+      is_untimely(*verdict.fix, output) ||
+      is_refused(admission.check_place(
+                     *verdict.fix, frame ? &*frame : nullptr, datum.has_value(), output.events),
+                 message.stamp_ns,
+                 output)) {
     return std::nullopt;
   }
   const bool moving =
@@ -253,18 +230,7 @@ MapFix GpsOdometry::Impl::place(const CheckedFix& fix) const {
                 frame->to_map(fix.place).value_or(Eigen::Vector3d::Zero()),
                 R * fix.covariance_enu_m2 * R.transpose()};
   if (fix.stamp_sigma_s > 0.0) {
-    // A stamp that is off by sigma puts the fix off along the way: (v sigma)^2.
-    const Track& track = filter->newest();
-    const Estimate estimate = filter->estimate();
-    const Eigen::Vector3d way =
-        fix.stamp_sigma_s * (estimate.T_map_base.q * estimate.linear_base_mps);
-    if (track.phase == Phase::kRunning) {
-      placed.covariance_map_m2 += way * way.transpose();
-    } else {
-      const double speed_m = fix.stamp_sigma_s * track.speed_mps;
-      placed.covariance_map_m2.topLeftCorner<2, 2>() +=
-          speed_m * speed_m * Eigen::Matrix2d::Identity();
-    }
+    placed.covariance_map_m2 += stamp_covariance_m2(fix.stamp_sigma_s, *filter);
   }
   return placed;
 }
@@ -295,81 +261,26 @@ void GpsOdometry::Impl::take_fix(const GnssFix& message, Output& output) {
   status_ns = now_ns;
 }
 
-bool GpsOdometry::Impl::is_in_known_frame(FrameIds& frames,
-                                          const std::string& frame_id,
-                                          const std::string& reason,
-                                          Nanoseconds stamp_ns,
-                                          Output& output) {
-  if (frames.allows(frame_id)) {
-    return true;
+bool GpsOdometry::Impl::is_refused(const std::optional<Refusal>& refusal,
+                                   Nanoseconds stamp_ns,
+                                   Output& output) {
+  if (refusal && refusal->text.empty()) {
+    counters.add(refusal->reason);
+  } else if (refusal) {
+    refuse(refusal->reason, refusal->text, stamp_ns, output);
   }
-  if (frames.is_news(frame_id)) {
-    refuse(reason, frames.text(frame_id), stamp_ns, output);
-  } else {
-    counters.add(reason);
-  }
-  return false;
-}
-
-bool GpsOdometry::Impl::put_on_imu_clock(CheckedFix& fix, Output& output) {
-  const auto imu_ns = filter->newest_imu_ns();
-  if (!imu_ns) {
-    return true;  // refused for that
-  }
-  const ClockVerdict verdict = clock.place(fix.stamp_ns, *imu_ns);
-  if (verdict.event) {
-    output.events.push_back(*verdict.event);
-  }
-  if (!verdict.stamp_ns) {
-    fixes_ahead = verdict.is_ahead ? fixes_ahead + 1 : 0;
-    refuse(verdict.reason, verdict.text, fix.stamp_ns, output);
-    return false;
-  }
-  fix.stamp_ns = *verdict.stamp_ns;
-  fix.stamp_sigma_s = clock.stamp_sigma_s();
-  return true;
-}
-
-bool GpsOdometry::Impl::is_misplaced(const CheckedFix& fix, Output& output) {
-  if (!frame) {
-    return false;
-  }
-  const auto position = frame->to_map(fix.place);
-  if (!position) {
-    refuse("not_on_map",
-           "Fix refused: the projection has no coordinates for it.",
-           fix.stamp_ns,
-           output);
-    return true;
-  }
-  if (!datum) {
-    return false;
-  }
-  const DistanceVerdict verdict = distance.check(*position);
-  if (verdict.refused) {
-    refuse("far_from_datum", verdict.text, fix.stamp_ns, output);
-    return true;
-  }
-  if (!verdict.text.empty()) {
-    output.events.push_back({Severity::kWarning, fix.stamp_ns, "fix_far_from_datum", verdict.text});
-  }
-  if (const auto doubt = height_reference.check(fix.stamp_ns, *position)) {
-    output.events.push_back({Severity::kWarning, fix.stamp_ns, "height_reference", *doubt});
-  }
-  return false;
+  return refusal.has_value();
 }
 
 void GpsOdometry::Impl::compare_turns(const MapFix& fix, Output& output) {
   const double sigma_m = std::sqrt(fix.covariance_map_m2.diagonal().head<2>().maxCoeff());
   const TurnVerdict verdict =
-      turns.add_fix(fix.checked.stamp_ns, fix.antenna_map_m.head<2>(), sigma_m);
+      admission.turns.add_fix(fix.checked.stamp_ns, fix.antenna_map_m.head<2>(), sigma_m);
   if (!verdict.reason.empty()) {
     imu_checks.condemn(verdict.reason, verdict.text);
     output.events.push_back({Severity::kError, fix.checked.stamp_ns, verdict.reason, verdict.text});
   }
 }
-
-// ---- optional inputs ----------------------------------------------------------------------------
 
 template <typename Checked>
 void GpsOdometry::Impl::take_aiding(const AidingVerdict<Checked>& verdict,
@@ -378,23 +289,7 @@ void GpsOdometry::Impl::take_aiding(const AidingVerdict<Checked>& verdict,
                                     Output& output) {
   if (!verdict.measurement) {
     refuse(verdict.reason, verdict.text, stamp_ns, output);
-    return;
-  }
-  const auto imu_ns = filter->newest_imu_ns();
-  if (!imu_ns) {
-    refuse(kind + "_before_imu", "Refused: there is no usable IMU sample yet.", stamp_ns, output);
-  } else if (stamp_ns > *imu_ns + from_seconds(config.future_limit_s)) {
-    refuse(kind + "_future_stamp",
-           "Refused: its stamp is " + std::to_string(to_seconds(stamp_ns - *imu_ns)) +
-               " s ahead of the newest IMU sample.",
-           stamp_ns,
-           output);
-  } else if (filter->is_too_old(stamp_ns)) {
-    refuse(kind + "_too_old",
-           "Refused: it is " + std::to_string(to_seconds(*imu_ns - stamp_ns)) + " s old.",
-           stamp_ns,
-           output);
-  } else {
+  } else if (!is_refused(admission.check_time(kind, stamp_ns, *filter), stamp_ns, output)) {
     filter->insert(*verdict.measurement);
   }
 }
@@ -406,9 +301,8 @@ void GpsOdometry::Impl::elect(const CheckedFix& fix, Output& output) {
     return;
   }
   if (const auto elected = election.add(fix)) {
-    move_to(*elected);
+    move_to(*elected, output);
     output.elected = elected;
-    tell_projection(output);
     output.events.push_back({Severity::kInfo,
                              fix.stamp_ns,
                              "datum_elected",
@@ -417,7 +311,7 @@ void GpsOdometry::Impl::elect(const CheckedFix& fix, Output& output) {
   }
 }
 
-void GpsOdometry::Impl::move_to(const Datum& new_datum) {
+void GpsOdometry::Impl::move_to(const Datum& new_datum, Output& output) {
   geodesy::LocalFrame new_frame = make_frame(new_datum, config);
   if (frame) {
     const geodesy::Geographic old_origin = place_of(frame->datum());
@@ -430,30 +324,10 @@ void GpsOdometry::Impl::move_to(const Datum& new_datum) {
   }
   frame = std::move(new_frame);
   datum = new_datum;
-  turns.restart();
-}
-
-/// With the paper's projection: what the grid would do to distances and directions.
-void GpsOdometry::Impl::tell_projection(Output& output) const {
-  if (config.projection != "utm" || !datum) {
-    return;
+  admission.turns.restart();
+  if (const auto event = projection_event(*frame, config, now_ns)) {
+    output.events.push_back(*event);
   }
-  if (frame->projection() != geodesy::Projection::kUtm) {
-    output.events.push_back({Severity::kWarning,
-                             now_ns,
-                             "utm_not_possible",
-                             "There is no UTM at the datum: the tangent plane is used."});
-    return;
-  }
-  const geodesy::UtmZone zone = geodesy::utm_zone_of(*datum);
-  const auto utm = geodesy::to_utm(place_of(*datum), zone);
-  output.events.push_back({Severity::kInfo,
-                           now_ns,
-                           "utm_projection",
-                           "UTM zone " + std::to_string(zone.zone) + (zone.north ? "N" : "S") +
-                               " by the datum: convergence " +
-                               std::to_string(utm->convergence_deg) + " degrees, scale " +
-                               std::to_string(utm->scale) + ", both taken out of map."});
 }
 
 // ---- output -------------------------------------------------------------------------------------
@@ -542,9 +416,10 @@ Output GpsOdometry::on_fix(const GnssFix& fix) {
 
 Output GpsOdometry::on_twist(const TwistMeasurement& twist) {
   Output output;
-  if (impl_->is_in_known_frame(
-          impl_->twist_frames, twist.frame_id, "twist_unknown_frame", twist.stamp_ns, output)) {
-    impl_->take_aiding(check_twist(twist, impl_->config), "twist", twist.stamp_ns, output);
+  Impl& impl = *impl_;
+  const auto refusal = impl.admission.check_frame(Source::kTwist, twist.frame_id);
+  if (!impl.is_refused(refusal, twist.stamp_ns, output)) {
+    impl.take_aiding(check_twist(twist, impl.config), "twist", twist.stamp_ns, output);
   }
   return output;
 }
@@ -563,12 +438,11 @@ Output GpsOdometry::on_datum(const Datum& candidate) {
     return output;
   }
   if (!impl.datum) {
-    impl.move_to(candidate);
+    impl.move_to(candidate, output);
     output.events.push_back({Severity::kInfo,
                              impl.now_ns,
                              "datum_adopted",
                              "Adopted the datum " + candidate.id() + "."});
-    impl.tell_projection(output);
   } else if (candidate.id() != impl.datum->id()) {
     const bool adopts = wins(candidate, *impl.datum);
     const std::string kept = adopts ? candidate.id() : impl.datum->id();
@@ -579,7 +453,7 @@ Output GpsOdometry::on_datum(const Datum& candidate) {
          "datum_conflict",
          "Two data were elected: the older, " + kept + ", holds; " + dropped + " is dropped."});
     if (adopts) {
-      impl.move_to(candidate);
+      impl.move_to(candidate, output);
     }
   }
   return output;
