@@ -5,6 +5,7 @@
 #include "trigpoint/base/so3.hpp"
 
 #include "fix_checks.hpp"
+#include <Eigen/Cholesky>
 
 #include <algorithm>
 #include <array>
@@ -21,6 +22,8 @@ using Eigen::Vector3d;
 // An axis of which nothing is known.
 constexpr double kNothing_m2ps2 = 1e8;
 constexpr double kHugeVariance = 1e6;
+constexpr int kRefusedInARow = 20;
+constexpr Nanoseconds kDistrust_ns = 20 * kNanosecondsPerSecond;
 constexpr double kUnitTolerance = 0.05;
 constexpr double kLeastNorm = 1e-6;  // drivers without attitude send zeros
 
@@ -73,6 +76,15 @@ AidingVerdict<CheckedTwist> check_twist(const TwistMeasurement& twist, const Con
             sentence("Twist refused: %g m/s, more than highest_speed_mps (km/h?).", speed)};
   }
   return {CheckedTwist{twist.stamp_ns, twist.linear_mps, usable_covariance(twist, config)}, "", ""};
+}
+
+bool passes_gate(AidingState& aiding, Nanoseconds stamp_ns, double distance2, double gate) {
+  aiding.twists_refused = distance2 <= gate ? 0 : aiding.twists_refused + 1;
+  if (aiding.twists_refused >= kRefusedInARow) {
+    aiding.twists_refused = 0;
+    aiding.twist_distrusted_until_ns = stamp_ns + kDistrust_ns;
+  }
+  return distance2 <= gate && stamp_ns >= aiding.twist_distrusted_until_ns;
 }
 
 AidingVerdict<CheckedYaw> check_yaw(const YawMeasurement& yaw, const Config& config) {

@@ -7,7 +7,6 @@
 #include "trigpoint/base/measurements.hpp"
 #include "trigpoint/gps_odometry/config.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include <optional>
@@ -41,7 +40,9 @@ AidingVerdict<CheckedYaw> check_yaw(const YawMeasurement& yaw, const Config& con
 
 /// Part of a Track: what aiding has done and what it waits for.
 struct AidingState {
-  Nanoseconds twist_ns{0};  ///< of the newest one used
+  Nanoseconds twist_ns{0};  ///< of the newest one judged
+  int twists_refused{0};    ///< in a row
+  Nanoseconds twist_distrusted_until_ns{0};
   Nanoseconds yaw_ns{0};
   /// Heading heard while there was none: add to the relative yaw of the search.
   bool has_prior{false};
@@ -53,15 +54,8 @@ struct AidingState {
   Nanoseconds yaw_distrusted_until_ns{0};
 };
 
-/// R such that an innovation beyond the gate lies on it: the farther off, the less it weighs.
-template <int M>
-Eigen::Matrix<double, M, M> clipped(const Eigen::Matrix<double, M, 1>& innovation,
-                                    const Eigen::Matrix<double, M, M>& S,
-                                    const Eigen::Matrix<double, M, M>& R,
-                                    double gate) {
-  const double distance2 = innovation.dot(S.ldlt().solve(innovation));
-  const double excess = distance2 / gate - 1.0;
-  return excess > 0.0 ? Eigen::Matrix<double, M, M>(R + excess * S) : R;
-}
+/// Notes whether a twist passed the gate. After many in a row that did not, wheels are not heard
+/// for a while: one that slips passes now and then by chance.
+bool passes_gate(AidingState& aiding, Nanoseconds stamp_ns, double distance2, double gate);
 
 }  // namespace trigpoint::gps_odometry

@@ -260,7 +260,7 @@ void describe_ins_imu(Eskf18Config& c, ConfigFields& f) {
       "accel_bias_sigma_mps2", c.accel_bias_sigma_mps2, "Accelerometer bias at start", kPositive);
   f.number("gyro_limit_radps",
            c.gyro_limit_radps,
-           "Range of an axis of the gyro; samples at the limit count as unknown",
+           "Range of an axis of the gyro; samples at the limit count as unknown (ekf15, too)",
            kPositive);
   f.number("accel_limit_mps2", c.accel_limit_mps2, "The same of the accelerometer", kPositive);
 }

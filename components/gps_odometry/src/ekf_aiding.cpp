@@ -25,9 +25,13 @@ FixOutcome EkfTracker::apply(EkfTrack& track, const CheckedTwist& twist) const {
   const Vector3d innovation =
       twist.velocity_base_mps - point_velocity(filter.x, config_.twist_point_base_m);
   const Matrix3d S = H * filter.P * H.transpose() + twist.covariance_m2ps2;
-  const Matrix3d R = clipped<3>(innovation, S, twist.covariance_m2ps2, gate3_);
-  track.twists_clipped += R != twist.covariance_m2ps2 ? 1 : 0;
-  update_point_velocity(filter, twist.velocity_base_mps, R, config_.twist_point_base_m);
+  const double distance2 = innovation.dot(S.ldlt().solve(innovation));
+  if (!passes_gate(track.aiding, twist.stamp_ns, distance2, gate3_)) {
+    ++track.twists_refused;
+    return {false, "", ""};
+  }
+  update_point_velocity(
+      filter, twist.velocity_base_mps, twist.covariance_m2ps2, config_.twist_point_base_m);
   return {true, "", ""};
 }
 

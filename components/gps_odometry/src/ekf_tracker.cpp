@@ -91,11 +91,13 @@ void EkfTracker::apply(EkfTrack& track, const CheckedImu& imu) const {
       track.filter.P.block<3, 3>(kAttitude, kAttitude).diagonal().array() +=
           gap_s * kTiltSigma_rad * kTiltSigma_rad;
     }
-    update_imu(track.filter,
-               imu.gyro_radps,
-               imu.accel_mps2,
-               config_.gyro_sigma_radps,
-               config_.accel_sigma_mps2);
+    if (!is_saturated(imu, config_)) {  // else motion is as unknown as without a sample
+      update_imu(track.filter,
+                 imu.gyro_radps,
+                 imu.accel_mps2,
+                 config_.gyro_sigma_radps,
+                 config_.accel_sigma_mps2);
+    }
   }
   track.stamp_ns = std::max(track.stamp_ns, imu.stamp_ns);
   track.imu_ns = imu.stamp_ns;

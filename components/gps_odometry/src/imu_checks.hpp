@@ -34,6 +34,9 @@ struct CheckedImu {
   std::optional<QuietWindow> quiet;                         ///< just ended
 };
 
+/// At the limit of an axis: motion was more than the sample says.
+bool is_saturated(const CheckedImu& imu, const Config& config);
+
 struct ImuVerdict {
   std::optional<CheckedImu> sample;  ///< nullopt: refused, or still warming up
   std::string reason;                ///< name of the counter; empty while warming up

@@ -24,10 +24,10 @@ struct TwistFit {
   Vector3d innovation_mps;
   Matrix3d S_m2ps2;
 
+  double distance2() const { return innovation_mps.dot(S_m2ps2.ldlt().solve(innovation_mps)); }
+
   double misfit() const {
-    const Eigen::LDLT<Matrix3d> ldlt(S_m2ps2);
-    return std::min(innovation_mps.dot(ldlt.solve(innovation_mps)), kWorstFit) +
-           ldlt.vectorD().array().log().sum();
+    return std::min(distance2(), kWorstFit) + S_m2ps2.ldlt().vectorD().array().log().sum();
   }
 };
 
@@ -64,16 +64,18 @@ FixOutcome InsTracker::apply(InsTrack& track, const CheckedTwist& twist) const {
     const double gain = 0.5 * (fit(track.rival, twist, point, gyro).misfit() - mine.misfit());
     track.log_ratio += std::clamp(gain, -kMostOfOneTwist, kMostOfOneTwist);
   }
-  const Matrix3d& reported = twist.covariance_m2ps2;
-  track.twists_clipped +=
-      clipped<3>(mine.innovation_mps, mine.S_m2ps2, reported, gate3_) != reported ? 1 : 0;
+  // Of two headings the better one decides whether the wheels slip.
+  const double distance2 =
+      track.has_rival ? std::min(mine.distance2(), fit(track.rival, twist, point, gyro).distance2())
+                      : mine.distance2();
+  if (!passes_gate(track.aiding, twist.stamp_ns, distance2, gate3_)) {
+    ++track.twists_refused;
+    return {false, "", ""};
+  }
   for_each(track, [&](Eskf18& filter) {
-    const TwistFit own = fit(filter, twist, point, gyro);
-    update_body_velocity(filter,
-                         twist.velocity_base_mps,
-                         clipped<3>(own.innovation_mps, own.S_m2ps2, reported, gate3_),
-                         point,
-                         gyro);
+    if (fit(filter, twist, point, gyro).distance2() <= gate3_) {
+      update_body_velocity(filter, twist.velocity_base_mps, twist.covariance_m2ps2, point, gyro);
+    }
   });
   return {true, "", ""};
 }

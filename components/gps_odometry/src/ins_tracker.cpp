@@ -26,7 +26,6 @@ constexpr double kGapRate_radps = 0.3;   // unknown motion in a gap
 constexpr double kGapAccel_mps2 = 2.0;
 constexpr double kSaturatedGyro_radps_sqrthz = 0.3;  // some rad/s and g for a hundredth of a second
 constexpr double kSaturatedAccel_mps2_sqrthz = 5.0;
-constexpr double kNearLimit = 0.98;
 constexpr double kLevelSigma_mps2 = 2.0;  // manoeuvres while nothing but gravity levels
 constexpr double kSlowDecay = 1e6;        // an absorbed jump stays
 // Rest, research/gps C5; each is widened by what the filter knows.
@@ -130,7 +129,7 @@ void InsTracker::step(InsTrack& track, const CheckedImu& imu, double gap_s, bool
 
 void InsTracker::apply(InsTrack& track, const CheckedImu& imu) const {
   const double gap_s = to_seconds(imu.stamp_ns - track.imu_ns);
-  const bool saturated = is_saturated(imu);
+  const bool saturated = is_saturated(imu, config_);
   if (track.phase == Phase::kNoImu || gap_s > kRestartGap_s) {
     start(track, imu);
   } else {
@@ -148,11 +147,6 @@ void InsTracker::apply(InsTrack& track, const CheckedImu& imu) const {
   } else if (gap_s <= kShortGap_s) {
     constrain(track, imu);
   }
-}
-
-bool InsTracker::is_saturated(const CheckedImu& imu) const {
-  return imu.raw_gyro_radps.cwiseAbs().maxCoeff() >= kNearLimit * config_.eskf18.gyro_limit_radps ||
-         imu.accel_mps2.cwiseAbs().maxCoeff() >= kNearLimit * config_.eskf18.accel_limit_mps2;
 }
 
 bool InsTracker::is_at_rest(const InsTrack& track, const QuietWindow& quiet) const {

@@ -88,7 +88,6 @@ class InsTracker {
   InsNoise noise(const InsTrack& track) const;
   void advance(InsTrack& track, Nanoseconds stamp_ns) const;
   void step(InsTrack& track, const CheckedImu& imu, double gap_s, bool saturated) const;
-  bool is_saturated(const CheckedImu& imu) const;
   bool is_at_rest(const InsTrack& track, const QuietWindow& quiet) const;
   void constrain(InsTrack& track, const CheckedImu& imu) const;
 

@@ -12,7 +12,8 @@ namespace {
 // Geoid undulations that matter (research/gps C2); the Earth's lie between -107 and 86 m.
 constexpr double kLeastUndulation_m = 10.0;
 constexpr double kLargestUndulation_m = 110.0;
-constexpr double kNearDatum_m = 300.0;  // hills are not undulations
+constexpr double kNearDatum_m = 300.0;
+constexpr double kSteepest = 0.3;  // hills are not undulations
 constexpr int kFixes = 10;
 constexpr double kOnePlace_m = 5.0;
 constexpr Nanoseconds kOneMoment_ns = 2 * kNanosecondsPerSecond;
@@ -51,8 +52,11 @@ std::optional<std::string> HeightReference::check(Nanoseconds stamp_ns,
   const double step_m = position_map_m.z() - last.z();
   last_map_m_ = position_map_m;
   last_ns_ = stamp_ns;
-  const bool near = position_map_m.head<2>().norm() < kNearDatum_m;
-  off_datum_ = near && can_be_undulation(position_map_m.z()) ? off_datum_ + 1 : 0;
+  const double distance_m = position_map_m.head<2>().norm();
+  const double beyond_hills_m = std::abs(position_map_m.z()) - kSteepest * distance_m;
+  const bool off = distance_m < kNearDatum_m && can_be_undulation(position_map_m.z()) &&
+                   beyond_hills_m > kLeastUndulation_m;
+  off_datum_ = off ? off_datum_ + 1 : 0;
   if (told_ || (!(one_place && can_be_undulation(step_m)) && off_datum_ < kFixes)) {
     return std::nullopt;
   }

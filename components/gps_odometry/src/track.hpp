@@ -69,7 +69,7 @@ struct Track {
   std::uint64_t recoveries{0};
   std::uint64_t not_finite{0};  ///< restarts after a step that was not finite
   std::uint64_t restored{0};    ///< covariances that were not positive
-  std::uint64_t twists_clipped{0};
+  std::uint64_t twists_refused{0};
   std::uint64_t yaws_refused{0};
   std::uint64_t yaws_contradicted{0};
 };

@@ -110,13 +110,13 @@ TEST(CheckYaw, normalises_adds_the_offset_and_knows_a_floor) {
   EXPECT_EQ(check_yaw(yaw, config).measurement->sigma_rad, config.yaw_default_sigma_rad);
 }
 
-TEST(Clipped, puts_an_innovation_beyond_the_gate_on_it) {
-  const Eigen::Vector3d innovation(3.0, -1.0, 0.5);
-  const Eigen::Matrix3d R = 0.04 * Eigen::Matrix3d::Identity();
-  const Eigen::Matrix3d P = Eigen::Vector3d(0.1, 0.2, 0.3).asDiagonal();
-  const Eigen::Matrix3d wide = clipped<3>(innovation, P + R, R, 16.0);
-  EXPECT_NEAR(innovation.dot((P + wide).ldlt().solve(innovation)), 16.0, 1e-9);
-  EXPECT_EQ(clipped<3>(0.1 * innovation, P + R, R, 16.0), R);
+TEST(PassesGate, does_not_hear_wheels_for_a_while_after_many_refusals) {
+  AidingState aiding;
+  for (int i = 0; i < 20; ++i) {
+    EXPECT_FALSE(passes_gate(aiding, stamp_of(0.1 * i), 20.0, 16.0));
+  }
+  EXPECT_FALSE(passes_gate(aiding, stamp_of(2.0), 1.0, 16.0));
+  EXPECT_TRUE(passes_gate(aiding, stamp_of(30.0), 1.0, 16.0));
 }
 
 TEST(PointVelocity, of_ekf15_has_the_jacobian_of_its_differences) {
@@ -249,12 +249,12 @@ TEST_P(Aiding, by_wheels_bounds_an_outage) {
   RecordProperty("without_cm", static_cast<int>(100.0 * alone.error_m.head<2>().norm()));
 }
 
-TEST_P(Aiding, by_wheels_that_spin_is_clipped_and_does_no_lasting_harm) {
+TEST_P(Aiding, by_wheels_that_spin_is_refused_and_does_no_lasting_harm) {
   Aided aided;
   aided.wheels = true;
   aided.wheel_scale = 4.0;
   const Recorded result = aided.run(GetParam());
-  EXPECT_GT(count_of(result.statuses.back(), "used_clipped_twist"), 10U);
+  EXPECT_GT(count_of(result.statuses.back(), "twist_gate"), 10U);
   EXPECT_LT(rms_m(result.samples, 30.0), 1.0);
 }
 

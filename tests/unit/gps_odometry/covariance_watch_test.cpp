@@ -91,7 +91,7 @@ TYPED_TEST(Watched, filter_goes_back_to_its_last_good_covariance_within_a_second
   const Config config;
   const TypeParam tracker(config, Eigen::Vector3d::Zero());
   Breaking<TypeParam> breaking(tracker);
-  breaking.break_ns = stamp_of(3.5);
+  breaking.break_ns = stamp_of(3.99);  // just before it is looked at
   RewindBuffer<Breaking<TypeParam>> buffer(breaking, kNanosecondsPerSecond);
   for (int i = 0; i < 600; ++i) {
     buffer.insert(checked_imu(0.01 * i));
