@@ -140,6 +140,35 @@ ImuSample from_message(const sensor_msgs::msg::Imu& message) {
   return imu;
 }
 
+TwistMeasurement twist_from_message(const geometry_msgs::msg::TwistWithCovarianceStamped& message) {
+  TwistMeasurement twist;
+  twist.stamp_ns = from_message(message.header().stamp());
+  twist.frame_id = message.header().frame_id();
+  twist.linear_mps = vector_of(message.twist().twist().linear());
+  twist.covariance_m2ps2 = from_row_major<6>(message.twist().covariance()).topLeftCorner<3, 3>();
+  return twist;
+}
+
+TwistMeasurement twist_from_message(const nav_msgs::msg::Odometry& message) {
+  TwistMeasurement twist;
+  twist.stamp_ns = from_message(message.header().stamp());
+  twist.frame_id = message.child_frame_id();
+  twist.linear_mps = vector_of(message.twist().twist().linear());
+  twist.covariance_m2ps2 = from_row_major<6>(message.twist().covariance()).topLeftCorner<3, 3>();
+  return twist;
+}
+
+YawMeasurement yaw_from_message(const sensor_msgs::msg::Imu& message) {
+  YawMeasurement yaw;
+  yaw.stamp_ns = from_message(message.header().stamp());
+  yaw.frame_id = message.header().frame_id();
+  yaw.variance_rad2 = message.orientation_covariance()[8];
+  if (has_orientation(message)) {
+    yaw.q_world_base = quaternion_of(message.orientation());
+  }
+  return yaw;
+}
+
 sensor_msgs::msg::NavSatFix to_message(const GnssFix& fix) {
   sensor_msgs::msg::NavSatFix message;
   message.header(header_of(fix.stamp_ns, fix.frame_id));

@@ -11,6 +11,7 @@
 #include "trigpoint/base/messages.hpp"
 
 #include "diagnostic_msgs.h"
+#include "geometry_msgs.h"
 #include "nav_msgs.h"
 #include "rosgraph_msgs.h"
 #include "sensor_msgs.h"
@@ -42,6 +43,11 @@ PointCloudMessage from_message(const sensor_msgs::msg::PointCloud2& message);
 /// Takes the bytes over instead of copying them.
 PointCloudMessage from_message(sensor_msgs::msg::PointCloud2&& message);
 Odometry from_message(const nav_msgs::msg::Odometry& message);
+TwistMeasurement twist_from_message(const geometry_msgs::msg::TwistWithCovarianceStamped& message);
+/// The twist of an Odometry, which is in its child frame.
+TwistMeasurement twist_from_message(const nav_msgs::msg::Odometry& message);
+/// The orientation as it came, also when it is not of unit length: the core judges it.
+YawMeasurement yaw_from_message(const sensor_msgs::msg::Imu& message);
 Datum datum_from_message(const sensor_msgs::msg::NavSatFix& message);
 GpsStatus from_message(const trigpoint_msgs::msg::GpsStatus& message);
 LioStatus from_message(const trigpoint_msgs::msg::LioStatus& message);
