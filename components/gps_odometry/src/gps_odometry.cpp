@@ -260,7 +260,10 @@ void GpsOdometry::Impl::take_aiding(const AidingVerdict<Checked>& verdict,
   if (!verdict.measurement) {
     refuse(verdict.reason, verdict.text, stamp_ns, output);
   } else if (!is_refused(admission.check_time(kind, stamp_ns, *filter), stamp_ns, output)) {
-    filter->insert(*verdict.measurement);
+    const FixOutcome outcome = filter->insert(*verdict.measurement);
+    if (outcome.reason.starts_with(kind + "_")) {  // others are counted in the Track
+      refuse(outcome.reason, outcome.text, stamp_ns, output);
+    }
   }
 }
 

@@ -312,6 +312,34 @@ TEST_P(Aiding, that_is_bad_in_any_way_leaves_the_state_as_it_was) {
 
 INSTANTIATE_TEST_SUITE_P(Filters, Aiding, testing::Values("ekf15", "eskf18"));
 
+TEST(Aiding, of_the_published_filter_is_refused_by_name_and_changes_nothing) {
+  Driven driven("ekf15_strict");
+  Driven alone("ekf15_strict");
+  TwistMeasurement twist = good_twist();
+  YawMeasurement yaw = good_yaw();
+  twist.stamp_ns = yaw.stamp_ns = driven.odometry.stamp_ns;
+  driven.take(driven.filter.on_twist(twist));
+  driven.take(driven.filter.on_yaw(yaw));
+  driven.advance(22.0);
+  alone.advance(22.0);
+  EXPECT_EQ(count_of(driven.status, "twist_not_an_input"), 1U);
+  EXPECT_EQ(count_of(driven.status, "yaw_not_an_input"), 1U);
+  EXPECT_EQ(driven.odometry.T_frame_child.p, alone.odometry.T_frame_child.p);
+}
+
+TEST(Aiding, in_a_frame_that_is_not_listed_is_refused_by_name) {
+  RobotConfig robot = rtk_robot().robot;
+  robot.twist_frame_ids = {"base_link"};
+  GpsOdometry filter(config_with_datum("ekf15"), robot);
+  TwistMeasurement twist = good_twist();
+  twist.frame_id = "wheel_left";
+  filter.on_twist(twist);
+  EXPECT_EQ(count_of(filter.status(), "twist_unknown_frame"), 1U);
+  twist.frame_id = "base_link";
+  filter.on_twist(twist);
+  EXPECT_EQ(count_of(filter.status(), "twist_unknown_frame"), 1U);
+}
+
 TEST(Aiding, by_wheels_tells_eskf18_at_once_that_it_starts_in_reverse) {
   Aided aided;
   aided.profile = reverse_start(1.5, 3.0);

@@ -52,7 +52,9 @@ class Breaking {
   void apply(State& track, const CheckedImu& imu) const {
     tracker_.apply(track, imu);
     if (imu.stamp_ns == break_ns) {
-      track.filter.P(3, 4) = track.filter.P(4, 3) = 1e3;
+      // Of the position, which no update mends while there are no fixes.
+      auto& P = track.filter.P;
+      P(0, 1) = P(1, 0) = 2.0 * std::sqrt(P(0, 0) * P(1, 1));
     }
   }
 

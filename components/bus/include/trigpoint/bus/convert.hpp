@@ -30,6 +30,11 @@ sensor_msgs::msg::Imu to_message(const ImuSample& imu);
 sensor_msgs::msg::NavSatFix to_message(const GnssFix& fix);
 sensor_msgs::msg::PointCloud2 to_message(const PointCloudMessage& cloud);
 nav_msgs::msg::Odometry to_message(const Odometry& odometry);
+geometry_msgs::msg::TwistWithCovarianceStamped to_message(const TwistMeasurement& twist);
+/// As the twist of an Odometry whose pose is unknown.
+nav_msgs::msg::Odometry to_odometry_message(const TwistMeasurement& twist);
+/// An Imu of which only the orientation is known.
+sensor_msgs::msg::Imu to_message(const YawMeasurement& yaw);
 sensor_msgs::msg::NavSatFix to_message(const Datum& datum);
 trigpoint_msgs::msg::GpsStatus to_message(const GpsStatus& status);
 trigpoint_msgs::msg::LioStatus to_message(const LioStatus& status);
