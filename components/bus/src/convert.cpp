@@ -105,7 +105,7 @@ geometry_msgs::msg::TwistWithCovariance twist_message(const TwistMeasurement& tw
   covariance.topLeftCorner<3, 3>() = twist.covariance_m2ps2;
   geometry_msgs::msg::TwistWithCovariance message;
   message.twist().linear(vector_message(twist.linear_mps));
-  message.covariance(row_major<6>(covariance));
+  message.covariance(row_major(covariance));
   return message;
 }
 
@@ -176,7 +176,7 @@ nav_msgs::msg::Odometry to_odometry_message(const TwistMeasurement& twist) {
   message.header(header_of(twist.stamp_ns, "odom"));
   message.child_frame_id(twist.frame_id);
   message.pose().pose().orientation().w(1.0);
-  message.pose().covariance(row_major<6>(Matrix6d::Identity() * kUnknownVariance));
+  message.pose().covariance(row_major(Matrix6d(Matrix6d::Identity() * kUnknownVariance)));
   message.twist(twist_message(twist));
   return message;
 }
