@@ -33,6 +33,27 @@ void describe(RobotConfig& config, ConfigFields& fields) {
               "PointCloud2, in a log or on the bus, without a leading slash");
   fields.text("imu_topic", config.imu_topic, "Imu");
   fields.text("fix_topic", config.fix_topic, "NavSatFix");
+  fields.text(
+      "twist_topic",
+      config.twist_topic,
+      "Velocity by wheels or else, for gps_odometry; reversing must be negative. Empty: none");
+  fields.choice("twist_message",
+                config.twist_message,
+                "Its type; of an Odometry the twist is used",
+                {"TwistWithCovarianceStamped", "Odometry"});
+  fields.text("yaw_topic",
+              config.yaw_topic,
+              "Imu whose orientation is a heading by magnetometer or two antennas; empty: none");
+  fields.texts("imu_frame_ids",
+               config.imu_frame_ids,
+               "Frames in which IMU samples may be; others are refused. None listed: any");
+  fields.texts("fix_frame_ids", config.fix_frame_ids, "The same for fixes");
+  fields.texts("twist_frame_ids", config.twist_frame_ids, "The same for twists");
+  fields.number("geoid_undulation_m",
+                config.geoid_undulation_m,
+                "Height of the geoid above the ellipsoid, added to the altitude of fixes: for "
+                "drivers that send heights above the sea",
+                {-120.0, 120.0});
 }
 
 }  // namespace trigpoint

@@ -24,6 +24,16 @@ Datum Wire<Datum>::read(Message&& message) {
   return datum_from_message(message);
 }
 
+template <>
+TwistMeasurement Wire<TwistMeasurement>::read(Message&& message) {
+  return twist_from_message(message);
+}
+
+template <>
+YawMeasurement Wire<YawMeasurement>::read(Message&& message) {
+  return yaw_from_message(message);
+}
+
 }  // namespace
 
 template <class Plain>
@@ -55,6 +65,8 @@ bool decode_cdr(std::span<const std::uint8_t> cdr, Plain& plain) {
 TRIGPOINT_CODEC(ImuSample, "sensor_msgs/msg/Imu")
 TRIGPOINT_CODEC(GnssFix, "sensor_msgs/msg/NavSatFix")
 TRIGPOINT_CODEC(PointCloudMessage, "sensor_msgs/msg/PointCloud2")
+TRIGPOINT_CODEC(TwistMeasurement, "geometry_msgs/msg/TwistWithCovarianceStamped")
+TRIGPOINT_CODEC(YawMeasurement, "sensor_msgs/msg/Imu")
 TRIGPOINT_CODEC(Odometry, "nav_msgs/msg/Odometry")
 TRIGPOINT_CODEC(Datum, "sensor_msgs/msg/NavSatFix")
 TRIGPOINT_CODEC(GpsStatus, "trigpoint_msgs/msg/GpsStatus")

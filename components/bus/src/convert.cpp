@@ -98,6 +98,30 @@ Eigen::Quaterniond quaternion_of(const geometry_msgs::msg::Quaternion& message) 
   return {message.w(), message.x(), message.y(), message.z()};
 }
 
+namespace {
+
+geometry_msgs::msg::TwistWithCovariance twist_message(const TwistMeasurement& twist) {
+  Matrix6d covariance = Matrix6d::Identity() * kUnknownVariance;  // the angular part
+  covariance.topLeftCorner<3, 3>() = twist.covariance_m2ps2;
+  geometry_msgs::msg::TwistWithCovariance message;
+  message.twist().linear(vector_message(twist.linear_mps));
+  message.covariance(row_major(covariance));
+  return message;
+}
+
+TwistMeasurement twist_of(const builtin_interfaces::msg::Time& stamp,
+                          const std::string& frame_id,
+                          const geometry_msgs::msg::TwistWithCovariance& message) {
+  TwistMeasurement twist;
+  twist.stamp_ns = from_message(stamp);
+  twist.frame_id = frame_id;
+  twist.linear_mps = vector_of(message.twist().linear());
+  twist.covariance_m2ps2 = from_row_major<6>(message.covariance()).topLeftCorner<3, 3>();
+  return twist;
+}
+
+}  // namespace
+
 builtin_interfaces::msg::Time to_message(Nanoseconds stamp_ns) {
   constexpr Nanoseconds kLowest = std::numeric_limits<std::int32_t>::min() * kNanosecondsPerSecond;
   constexpr Nanoseconds kHighest =
@@ -138,6 +162,54 @@ ImuSample from_message(const sensor_msgs::msg::Imu& message) {
     imu.q_world_base = quaternion_of(message.orientation());
   }
   return imu;
+}
+
+geometry_msgs::msg::TwistWithCovarianceStamped to_message(const TwistMeasurement& twist) {
+  geometry_msgs::msg::TwistWithCovarianceStamped message;
+  message.header(header_of(twist.stamp_ns, twist.frame_id));
+  message.twist(twist_message(twist));
+  return message;
+}
+
+nav_msgs::msg::Odometry to_odometry_message(const TwistMeasurement& twist) {
+  nav_msgs::msg::Odometry message;
+  message.header(header_of(twist.stamp_ns, "odom"));
+  message.child_frame_id(twist.frame_id);
+  message.pose().pose().orientation().w(1.0);
+  message.pose().covariance(row_major(Matrix6d(Matrix6d::Identity() * kUnknownVariance)));
+  message.twist(twist_message(twist));
+  return message;
+}
+
+TwistMeasurement twist_from_message(const geometry_msgs::msg::TwistWithCovarianceStamped& message) {
+  return twist_of(message.header().stamp(), message.header().frame_id(), message.twist());
+}
+
+TwistMeasurement twist_from_message(const nav_msgs::msg::Odometry& message) {
+  return twist_of(message.header().stamp(), message.child_frame_id(), message.twist());
+}
+
+sensor_msgs::msg::Imu to_message(const YawMeasurement& yaw) {
+  sensor_msgs::msg::Imu message;
+  message.header(header_of(yaw.stamp_ns, yaw.frame_id));
+  message.orientation(
+      quaternion_message(yaw.q_world_base.value_or(Eigen::Quaterniond::Identity())));
+  message.orientation_covariance()[0] = yaw.q_world_base ? 0.0 : kNoOrientation;
+  message.orientation_covariance()[8] = yaw.variance_rad2;
+  message.angular_velocity_covariance()[0] = -1.0;
+  message.linear_acceleration_covariance()[0] = -1.0;
+  return message;
+}
+
+YawMeasurement yaw_from_message(const sensor_msgs::msg::Imu& message) {
+  YawMeasurement yaw;
+  yaw.stamp_ns = from_message(message.header().stamp());
+  yaw.frame_id = message.header().frame_id();
+  yaw.variance_rad2 = message.orientation_covariance()[8];
+  if (has_orientation(message)) {
+    yaw.q_world_base = quaternion_of(message.orientation());
+  }
+  return yaw;
 }
 
 sensor_msgs::msg::NavSatFix to_message(const GnssFix& fix) {

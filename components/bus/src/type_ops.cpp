@@ -77,6 +77,8 @@ TRIGPOINT_BUS_TYPE(sensor_msgs::msg::Imu, "sensor_msgs/msg/Imu")
 TRIGPOINT_BUS_TYPE(sensor_msgs::msg::NavSatFix, "sensor_msgs/msg/NavSatFix")
 TRIGPOINT_BUS_TYPE(sensor_msgs::msg::PointCloud2, "sensor_msgs/msg/PointCloud2")
 TRIGPOINT_BUS_TYPE(nav_msgs::msg::Odometry, "nav_msgs/msg/Odometry")
+TRIGPOINT_BUS_TYPE(geometry_msgs::msg::TwistWithCovarianceStamped,
+                   "geometry_msgs/msg/TwistWithCovarianceStamped")
 TRIGPOINT_BUS_TYPE(tf2_msgs::msg::TFMessage, "tf2_msgs/msg/TFMessage")
 TRIGPOINT_BUS_TYPE(diagnostic_msgs::msg::DiagnosticArray, "diagnostic_msgs/msg/DiagnosticArray")
 TRIGPOINT_BUS_TYPE(rosgraph_msgs::msg::Clock, "rosgraph_msgs/msg/Clock")

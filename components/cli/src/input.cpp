@@ -98,13 +98,14 @@ SystemConfig configure(const InputOptions& options, const Known& known) {
     set_mode(config, options.mode);
   }
   if (mode_of(config) == "lio") {
-    config.log.require_fix = false;  // nothing would use them
+    config.log.require_fix = config.log.require_aiding = false;  // nothing would use them
   }
   if (options.duration_s > 0.0) {
     config.log.duration_s = options.duration_s;
   }
   if (options.lenient) {
     config.log.require_points = config.log.require_imu = config.log.require_fix = false;
+    config.log.require_aiding = false;
   }
   return config;
 }
@@ -117,7 +118,7 @@ void check_cores(const SystemConfig& config) {
 /// A topic that the user named and that is not in the log, whatever else is wrong with it.
 bool names_an_absent_topic(const std::string& log, const SystemConfig& config) {
   recording::LogOptions any = config.log;
-  any.require_points = any.require_imu = any.require_fix = false;
+  any.require_points = any.require_imu = any.require_fix = any.require_aiding = false;
   const RobotConfig defaults;
   const RobotConfig& robot = config.cores.robot;
   try {
@@ -129,7 +130,8 @@ bool names_an_absent_topic(const std::string& log, const SystemConfig& config) {
              });
     };
     return is_absent(&RobotConfig::points_topic) || is_absent(&RobotConfig::imu_topic) ||
-           is_absent(&RobotConfig::fix_topic);
+           is_absent(&RobotConfig::fix_topic) || is_absent(&RobotConfig::twist_topic) ||
+           is_absent(&RobotConfig::yaw_topic);
   } catch (const recording::LogError&) {
     return false;
   }

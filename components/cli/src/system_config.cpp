@@ -10,6 +10,9 @@ void describe_log(recording::LogOptions& log, ConfigFields& fields) {
   fields.flag("require_points", log.require_points, "refuse a log without the points topic");
   fields.flag("require_imu", log.require_imu, "refuse a log without the IMU topic");
   fields.flag("require_fix", log.require_fix, "refuse a log without the GPS topic");
+  fields.flag("require_aiding",
+              log.require_aiding,
+              "refuse a log without robot.twist_topic or robot.yaw_topic, where these are named");
   fields.number("fix_rate_limit_hz",
                 log.fix_rate_limit_hz,
                 "fixes beyond this rate are withheld, for scoring only; 0 feeds all",

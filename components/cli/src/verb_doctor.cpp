@@ -94,8 +94,8 @@ int examine_entries(recording::LogReader& reader, const RobotConfig& robot) {
         imu.take(*sample);
       } else if (const auto* fix = std::get_if<GnssFix>(&entry->measurement)) {
         fixes.take(*fix);
-      } else {
-        points.take(std::get<PointCloudMessage>(entry->measurement));
+      } else if (const auto* cloud = std::get_if<PointCloudMessage>(&entry->measurement)) {
+        points.take(*cloud);
       }
     }
   } catch (const recording::LogError& broken) {
@@ -145,6 +145,15 @@ int tell_topics(const recording::LogSummary& summary, const RobotConfig& robot) 
     require("robot.points_topic", robot.points_topic, "sensor_msgs/msg/PointCloud2");
     require("robot.imu_topic", robot.imu_topic, "sensor_msgs/msg/Imu");
     require("robot.fix_topic", robot.fix_topic, "sensor_msgs/msg/NavSatFix");
+    if (!robot.twist_topic.empty()) {
+      require("robot.twist_topic",
+              robot.twist_topic,
+              robot.twist_message == "Odometry" ? "nav_msgs/msg/Odometry"
+                                                : "geometry_msgs/msg/TwistWithCovarianceStamped");
+    }
+    if (!robot.yaw_topic.empty()) {
+      require("robot.yaw_topic", robot.yaw_topic, "sensor_msgs/msg/Imu");
+    }
   }
   return wrong;
 }

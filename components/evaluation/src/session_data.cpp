@@ -125,6 +125,12 @@ void load_config(SessionData& data, const ReportOptions& options) {
     if (const YAML::Node gps = config["gps_odometry"]; gps && gps.IsMap()) {
       data.datum_fixes = gps["datum_fixes"].as<std::int64_t>(data.datum_fixes);
     }
+    if (const YAML::Node robot = config["robot"]; robot && robot.IsMap()) {
+      const double undulation_m = robot["geoid_undulation_m"].as<double>(0.0);
+      for (exporter::LoggedFix& logged : data.fixes) {
+        logged.fix.altitude_m += undulation_m;  // as the filter did
+      }
+    }
     const YAML::Node lever = config["robot"]["antenna_position_base_m"];
     if (options.antenna_position_base_m) {
       return;

@@ -277,6 +277,8 @@ std::vector<NamedCount> counts_of(const GpsStatus& status) {
   add("fix.refused.", RejectionKind::kFixRefused);
   add("fix.note.", RejectionKind::kNote);
   add("imu.refused.", RejectionKind::kImu);
+  add("twist.refused.", RejectionKind::kTwist);
+  add("yaw.refused.", RejectionKind::kYaw);
   return counts;
 }
 

@@ -124,7 +124,8 @@ void FusionGate::Impl::take_raw_fix(const GnssFix& fix, Output& out) {
   ++fixes_seen;
   verdict_changed = true;
   follow_healthiest(out);
-  const geodesy::Geographic place{fix.latitude_deg, fix.longitude_deg, fix.altitude_m};
+  const geodesy::Geographic place{
+      fix.latitude_deg, fix.longitude_deg, fix.altitude_m + robot.geoid_undulation_m};
   const bool wanted =
       std::any_of(foreign_sources.begin(), foreign_sources.end(), [&](const auto& entry) {
         return sources.is_foreign(entry.first, now_ns);

@@ -2,6 +2,7 @@
 // Copyright the Trigpoint developers
 #include "trigpoint/geodesy/local_frame.hpp"
 
+#include "utm_plane.hpp"
 #include <GeographicLib/LocalCartesian.hpp>
 
 #include <array>
@@ -56,18 +57,48 @@ std::optional<std::string> find_fault(const Geographic& place) {
 }
 
 struct LocalFrame::Impl {
-  explicit Impl(const Datum& d)
-      : datum(d), cartesian(d.latitude_deg, d.longitude_deg, d.height_m) {}
+  Impl(const Datum& d, Projection projection)
+      : datum(d), cartesian(d.latitude_deg, d.longitude_deg, d.height_m) {
+    if (projection == Projection::kUtm) {
+      utm.emplace(d);
+    }
+  }
+
+  std::optional<Eigen::Vector3d> forward(const Geographic& place) const {
+    if (utm) {
+      return utm->to_map(place);
+    }
+    Eigen::Vector3d position_map_m;
+    cartesian.Forward(place.latitude_deg,
+                      place.longitude_deg,
+                      place.height_m,
+                      position_map_m.x(),
+                      position_map_m.y(),
+                      position_map_m.z());
+    return position_map_m;
+  }
+
+  Geographic reverse(const Eigen::Vector3d& position_map_m) const {
+    Geographic place;
+    cartesian.Reverse(position_map_m.x(),
+                      position_map_m.y(),
+                      position_map_m.z(),
+                      place.latitude_deg,
+                      place.longitude_deg,
+                      place.height_m);
+    return place;
+  }
 
   Datum datum;
   GeographicLib::LocalCartesian cartesian;
+  std::optional<UtmPlane> utm;
 };
 
-LocalFrame::LocalFrame(const Datum& datum) {
+LocalFrame::LocalFrame(const Datum& datum, Projection projection) {
   if (const auto fault = find_fault(place_of(datum))) {
     throw std::invalid_argument("The datum is not a place: " + *fault + ".");
   }
-  impl_ = std::make_unique<Impl>(datum);
+  impl_ = std::make_unique<Impl>(datum, projection);
 }
 
 LocalFrame::~LocalFrame() = default;
@@ -86,34 +117,33 @@ const Datum& LocalFrame::datum() const {
   return impl_->datum;
 }
 
+Projection LocalFrame::projection() const {
+  return impl_->utm ? Projection::kUtm : Projection::kEnu;
+}
+
 std::optional<Eigen::Vector3d> LocalFrame::to_map(const Geographic& place) const {
   // Checked before, because GeographicLib wraps silly longitudes without a word, and after, because
   // LocalCartesian answers NaN without throwing.
   if (find_fault(place)) {
     return std::nullopt;
   }
-  Eigen::Vector3d position_map_m;
-  impl_->cartesian.Forward(place.latitude_deg,
-                           place.longitude_deg,
-                           place.height_m,
-                           position_map_m.x(),
-                           position_map_m.y(),
-                           position_map_m.z());
-  if (!position_map_m.allFinite()) {
+  const std::optional<Eigen::Vector3d> position_map_m = impl_->forward(place);
+  if (!position_map_m || !position_map_m->allFinite()) {
     return std::nullopt;
   }
   return position_map_m;
 }
 
 Geographic LocalFrame::to_geographic(const Eigen::Vector3d& position_map_m) const {
-  Geographic place;
-  if (position_map_m.allFinite()) {
-    impl_->cartesian.Reverse(position_map_m.x(),
-                             position_map_m.y(),
-                             position_map_m.z(),
-                             place.latitude_deg,
-                             place.longitude_deg,
-                             place.height_m);
+  if (!position_map_m.allFinite()) {
+    return {};
+  }
+  Geographic place = impl_->reverse(position_map_m);
+  if (impl_->utm) {
+    // The two projections differ by millimetres in a kilometre: one correction makes it exact.
+    if (const auto there = to_map(place)) {
+      place = impl_->reverse(2.0 * position_map_m - *there);
+    }
   }
   return place;
 }

@@ -63,4 +63,31 @@ std::optional<UtmPosition> to_utm(const Geographic& place, const UtmZone& zone) 
   return utm;
 }
 
+std::optional<Geographic> from_utm(double easting_m,
+                                   double northing_m,
+                                   double height_m,
+                                   const UtmZone& zone) {
+  if (!std::isfinite(easting_m) || !std::isfinite(northing_m) || zone.zone < 1 || zone.zone > 60) {
+    return std::nullopt;
+  }
+  // The northern hemisphere's equations hold on both sides of the equator.
+  const double northing = zone.north ? northing_m : northing_m - kSouthFalseNorthing_m;
+  Geographic place;
+  place.height_m = height_m;
+  try {
+    GeographicLib::UTMUPS::Reverse(zone.zone,
+                                   northing >= 0.0,
+                                   easting_m,
+                                   northing >= 0.0 ? northing : northing + kSouthFalseNorthing_m,
+                                   place.latitude_deg,
+                                   place.longitude_deg);
+  } catch (const std::exception&) {
+    return std::nullopt;  // too far from the zone
+  }
+  if (find_fault(place)) {
+    return std::nullopt;
+  }
+  return place;
+}
+
 }  // namespace trigpoint::geodesy

@@ -96,6 +96,7 @@ class Process {
                    [this, &loop](const sensor_msgs::msg::NavSatFix& m, const bus::MessageInfo&) {
                      loop.post([this, fix = bus::from_message(m)] { take(core_.on_fix(fix)); });
                    });
+    subscribe_to_aiding(settings.robot, loop);
     loop.every(std::chrono::seconds(1), [this] { diagnose(); });
   }
 
@@ -151,6 +152,27 @@ class Process {
   void keep(Write write) {
     if (session_) {
       disk_.keep(write);
+    }
+  }
+
+  /// Wheels and heading, where the robot has a topic for them.
+  void subscribe_to_aiding(const RobotConfig& robot, bus::Loop& loop) {
+    const auto on_twist = [this, &loop](const auto& m, const bus::MessageInfo&) {
+      loop.post([this, twist = bus::twist_from_message(m)] { take(core_.on_twist(twist)); });
+    };
+    if (!robot.twist_topic.empty() && robot.twist_message == "Odometry") {
+      odometry_twists_.emplace(
+          participant_, topics::twist_odometry.renamed(robot.twist_topic), on_twist);
+    } else if (!robot.twist_topic.empty()) {
+      twists_.emplace(participant_, topics::twist.renamed(robot.twist_topic), on_twist);
+    }
+    if (!robot.yaw_topic.empty()) {
+      yaws_.emplace(
+          participant_,
+          topics::yaw.renamed(robot.yaw_topic),
+          [this, &loop](const sensor_msgs::msg::Imu& m, const bus::MessageInfo&) {
+            loop.post([this, yaw = bus::yaw_from_message(m)] { take(core_.on_yaw(yaw)); });
+          });
     }
   }
 
@@ -211,6 +233,9 @@ class Process {
   std::optional<bus::Subscription<trigpoint_msgs::msg::GpsStatus>> other_status_;
   std::optional<bus::Subscription<sensor_msgs::msg::Imu>> imu_;
   std::optional<bus::Subscription<sensor_msgs::msg::NavSatFix>> fixes_;
+  std::optional<bus::Subscription<geometry_msgs::msg::TwistWithCovarianceStamped>> twists_;
+  std::optional<bus::Subscription<nav_msgs::msg::Odometry>> odometry_twists_;
+  std::optional<bus::Subscription<sensor_msgs::msg::Imu>> yaws_;
 };
 
 int run(const shell::Options& options, const shell::EventLog& log) {

@@ -10,4 +10,7 @@ double chi_square_limit_1(double probability);
 /// The same for 2 degrees of freedom.
 double chi_square_limit_2(double probability);
 
+/// The same for 3 degrees of freedom.
+double chi_square_limit_3(double probability);
+
 }  // namespace trigpoint::gps_odometry

@@ -43,6 +43,70 @@ void describe_datum(Config& c, ConfigFields& f) {
   f.integer("datum_fixes", c.datum_fixes, "Fixes whose mean an elected datum is", {1, 1000});
 }
 
+void describe_map(Config& c, ConfigFields& f) {
+  f.choice("projection",
+           c.projection,
+           "How fixes become positions in map: enu (tangent plane) or utm (the paper's equations "
+           "6-7); both give true metres along east, north, up",
+           {"enu", "utm"});
+  f.number("warn_distance_m",
+           c.warn_distance_m,
+           "A warning when fixes are farther from the datum (m)",
+           kPositive);
+  f.number("highest_distance_m",
+           c.highest_distance_m,
+           "Fixes farther from the datum are refused (m)",
+           kPositive);
+}
+
+void describe_clock(Config& c, ConfigFields& f) {
+  f.number("clock_latest_s",
+           c.clock_latest_s,
+           "No fix is later than this: one that seems to be has another clock than the IMU (s)",
+           kPositive);
+  f.number("clock_latency_s",
+           c.clock_latency_s,
+           "Where the clocks differ: least time from a fix's epoch to its arrival (s)",
+           kNotNegative);
+  f.number("clock_latency_sigma_s",
+           c.clock_latency_sigma_s,
+           "How far that may be wrong (s); times the speed it is added to the fix's sigma",
+           kNotNegative);
+}
+
+void describe_aiding(Config& c, ConfigFields& f) {
+  f.number("twist_interval_s",
+           c.twist_interval_s,
+           "Twists (robot.twist_topic): shortest time between two that are used",
+           kPositive);
+  f.number("twist_default_sigma_mps",
+           c.twist_default_sigma_mps,
+           "Forward velocity of a twist without covariance; its other axes are not used",
+           kPositive);
+  f.number(
+      "twist_floor_sigma_mps", c.twist_floor_sigma_mps, "Added to what a twist reports", kPositive);
+  f.number("twist_share",
+           c.twist_share,
+           "The same as a share of the speed: wheel radius, slip",
+           kNotNegative);
+  f.vector3("twist_point_base_m",
+            c.twist_point_base_m,
+            "The point whose velocity a twist is, e.g. the middle of the rear axle");
+  f.number("yaw_interval_s",
+           c.yaw_interval_s,
+           "Headings (robot.yaw_topic): shortest time between two that are used",
+           kPositive);
+  f.number("yaw_offset_rad",
+           c.yaw_offset_rad,
+           "Added to a heading: magnetic declination (east is negative), mounting of the antennas",
+           {-6.3, 6.3});
+  f.number("yaw_default_sigma_rad",
+           c.yaw_default_sigma_rad,
+           "Sigma of a heading without covariance",
+           kPositive);
+  f.number("yaw_floor_sigma_rad", c.yaw_floor_sigma_rad, "Least sigma of a heading", kPositive);
+}
+
 void describe_checks(Config& c, ConfigFields& f) {
   f.number("future_limit_s",
            c.future_limit_s,
@@ -196,7 +260,7 @@ void describe_ins_imu(Eskf18Config& c, ConfigFields& f) {
       "accel_bias_sigma_mps2", c.accel_bias_sigma_mps2, "Accelerometer bias at start", kPositive);
   f.number("gyro_limit_radps",
            c.gyro_limit_radps,
-           "Range of an axis of the gyro; samples at the limit count as unknown",
+           "Range of an axis of the gyro; samples at the limit count as unknown (ekf15, too)",
            kPositive);
   f.number("accel_limit_mps2", c.accel_limit_mps2, "The same of the accelerometer", kPositive);
 }
@@ -298,10 +362,13 @@ void describe_eskf18(Eskf18Config& config, ConfigFields& fields) {
 void describe(Config& config, ConfigFields& fields) {
   describe_output(config, fields);
   describe_datum(config, fields);
+  describe_map(config, fields);
   describe_checks(config, fields);
+  describe_clock(config, fields);
   describe_fix(config, fields);
   describe_imu(config, fields);
   describe_heading(config, fields);
+  describe_aiding(config, fields);
   fields.section("eskf18", "only the filter eskf18", [&config](ConfigFields& f) {
     describe_eskf18(config.eskf18, f);
   });

@@ -37,7 +37,12 @@ void update(Ekf15& filter,
             const Eigen::Matrix<double, M, M>& R) {
   const Eigen::Matrix<double, 15, M> PHt = filter.P * H.transpose();
   const Eigen::Matrix<double, M, M> S = H * PHt + R;
-  const Eigen::Matrix<double, 15, M> K = S.ldlt().solve(PHt.transpose()).transpose();
+  Eigen::Matrix<double, 15, M> K;
+  if constexpr (M == 1) {
+    K = PHt / S.value();
+  } else {
+    K = S.ldlt().solve(PHt.transpose()).transpose();
+  }
   filter.x += K * innovation;
   for (int i = 0; i < 3; ++i) {
     filter.x(kAttitude + i) = wrap_angle(filter.x(kAttitude + i));
@@ -212,6 +217,32 @@ void update_velocity(Ekf15& filter, const Vector3d& velocity_base_mps, const Vec
   H.block<3, 3>(0, kVelocity).setIdentity();
   const Vector3d innovation = velocity_base_mps - filter.x.segment<3>(kVelocity);
   update<3>(filter, innovation, H, sigma_mps.cwiseAbs2().asDiagonal());
+}
+
+Vector3d point_velocity(const Vector15d& x, const Vector3d& point_base_m) {
+  return x.segment<3>(kVelocity) + x.segment<3>(kRate).cross(point_base_m);
+}
+
+Eigen::Matrix<double, 3, 15> point_velocity_jacobian(const Vector3d& point_base_m) {
+  Eigen::Matrix<double, 3, 15> H = Eigen::Matrix<double, 3, 15>::Zero();
+  H.block<3, 3>(0, kVelocity).setIdentity();
+  H.block<3, 3>(0, kRate) = -hat(point_base_m);
+  return H;
+}
+
+void update_point_velocity(Ekf15& filter,
+                           const Vector3d& velocity_base_mps,
+                           const Matrix3d& covariance_m2ps2,
+                           const Vector3d& point_base_m) {
+  const Vector3d innovation = velocity_base_mps - point_velocity(filter.x, point_base_m);
+  update<3>(filter, innovation, point_velocity_jacobian(point_base_m), covariance_m2ps2);
+}
+
+void update_yaw(Ekf15& filter, double yaw_rad, double sigma_rad) {
+  Eigen::Matrix<double, 1, 15> H = Eigen::Matrix<double, 1, 15>::Zero();
+  H(kAttitude + 2) = 1.0;
+  const Eigen::Matrix<double, 1, 1> innovation(wrap_angle(yaw_rad - filter.x(kAttitude + 2)));
+  update<1>(filter, innovation, H, Eigen::Matrix<double, 1, 1>(sigma_rad * sigma_rad));
 }
 
 void reset_block(Ekf15& filter, int first, const Matrix3d& covariance) {

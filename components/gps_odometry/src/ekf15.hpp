@@ -7,6 +7,7 @@
 // models).
 #pragma once
 
+#include "covariance_watch.hpp"
 #include "gravity.hpp"
 #include <Eigen/Core>
 
@@ -42,6 +43,10 @@ struct Ekf15 {
   Eigen::Matrix3d R_map_base() const;
 
   bool is_finite() const { return x.allFinite() && P.allFinite(); }
+
+  bool is_positive() const { return is_positive_covariance(P); }
+
+  void bound() { bound_position(P); }
 };
 
 /// Body rates = W(rpy) d(rpy)/dt; a small rotation about body axes = W d(rpy).
@@ -82,6 +87,19 @@ void update_antenna(Ekf15& filter,
 void update_velocity(Ekf15& filter,
                      const Eigen::Vector3d& velocity_base_mps,
                      const Eigen::Vector3d& sigma_mps);
+
+/// Velocity, in base_link's axes, of a point of the vehicle.
+Eigen::Vector3d point_velocity(const Vector15d& x, const Eigen::Vector3d& point_base_m);
+Eigen::Matrix<double, 3, 15> point_velocity_jacobian(const Eigen::Vector3d& point_base_m);
+
+/// A twist's linear part (wheels).
+void update_point_velocity(Ekf15& filter,
+                           const Eigen::Vector3d& velocity_base_mps,
+                           const Eigen::Matrix3d& covariance_m2ps2,
+                           const Eigen::Vector3d& point_base_m);
+
+/// Heading in map, counter-clockwise from east (magnetometer, two antennas).
+void update_yaw(Ekf15& filter, double yaw_rad, double sigma_rad);
 
 /// Forgets what `size` states from `first` were, and sets their covariance.
 void reset_block(Ekf15& filter, int first, const Eigen::Matrix3d& covariance);

@@ -36,7 +36,8 @@ EkfTracker::EkfTracker(const Config& config, const Vector3d& lever_base_m)
     : config_(config),
       lever_base_m_(lever_base_m),
       gate2_(chi_square_limit_2(config.gate_probability)),
-      gate1_(chi_square_limit_1(config.gate_probability)) {}
+      gate1_(chi_square_limit_1(config.gate_probability)),
+      gate3_(chi_square_limit_3(config.gate_probability)) {}
 
 // ---- IMU ----------------------------------------------------------------------------------------
 
@@ -53,6 +54,7 @@ void EkfTracker::start(EkfTrack& track, const CheckedImu& imu) const {
       1.0, 1.0;
   track.filter.P = sigma.cwiseAbs2().asDiagonal();
   track.heading.restart();
+  track.aiding = AidingState{};
 }
 
 MotionNoise EkfTracker::noise(const EkfTrack& track) const {
@@ -91,11 +93,13 @@ void EkfTracker::apply(EkfTrack& track, const CheckedImu& imu) const {
       track.filter.P.block<3, 3>(kAttitude, kAttitude).diagonal().array() +=
           gap_s * kTiltSigma_rad * kTiltSigma_rad;
     }
-    update_imu(track.filter,
-               imu.gyro_radps,
-               imu.accel_mps2,
-               config_.gyro_sigma_radps,
-               config_.accel_sigma_mps2);
+    if (!is_saturated(imu, config_)) {  // else motion is as unknown as without a sample
+      update_imu(track.filter,
+                 imu.gyro_radps,
+                 imu.accel_mps2,
+                 config_.gyro_sigma_radps,
+                 config_.accel_sigma_mps2);
+    }
   }
   track.stamp_ns = std::max(track.stamp_ns, imu.stamp_ns);
   track.imu_ns = imu.stamp_ns;
@@ -167,14 +171,11 @@ FixOutcome EkfTracker::align(EkfTrack& track, const MapFix& fix) const {
   if (track.accepted_ns > 0 && elapsed_s > 0.0) {
     track.speed_mps = step.head<2>().norm() / elapsed_s;
   }
-  const Matrix3d R = track.filter.R_map_base();  // map's tilt, a heading of its own
-  CoursePoint point;
-  point.stamp_ns = fix.checked.stamp_ns;
-  point.antenna_map_m = fix.antenna_map_m.head<2>();
-  point.sigma_m = std::sqrt(fix.covariance_map_m2.diagonal().head<2>().maxCoeff());
-  point.yaw_relative_rad = track.filter.x(kAttitude + 2);
-  point.lever_relative_m = (R * lever_base_m_).head<2>();
-  const auto heading = track.heading.add(point, config_);
+  const CoursePoint point = course_point(track, fix);
+  auto heading = track.heading.add(point, config_);
+  if (!heading && track.accepted_ns > 0) {
+    heading = heard_heading(track.aiding, step.head<2>(), elapsed_s, point.sigma_m);
+  }
   if (heading) {
     begin_running(track, fix, *heading);
   } else {
@@ -196,6 +197,10 @@ void EkfTracker::begin_running(EkfTrack& track,
   filter.P.col(kAttitude + 2).setZero();
   filter.P(kAttitude + 2, kAttitude + 2) = heading.sigma_rad * heading.sigma_rad;
   filter.x.segment<3>(kVelocity) = Vector3d(heading.speed_mps, 0.0, 0.0);
+  if (heading.heard) {
+    const Eigen::Vector2d& v = heading.velocity_map_mps;
+    filter.x.segment<3>(kVelocity) = filter.R_map_base().transpose() * Vector3d(v.x(), v.y(), 0.0);
+  }
   reset_block(
       filter, kVelocity, Matrix3d::Identity() * heading.speed_sigma_mps * heading.speed_sigma_mps);
   const Vector3d lever_map = filter.R_map_base() * lever_base_m_;
@@ -206,6 +211,9 @@ void EkfTracker::begin_running(EkfTrack& track,
       Matrix3d::Identity();
   reset_block(filter, kPosition, fix.covariance_map_m2 + lever_part);
   track.phase = Phase::kRunning;
+  track.heading.restart();
+  track.aiding.has_prior = false;
+  track.aiding.heading_unproven = heading.heard;
   track.refused = RefusedStreak{};
   track.refused_height = RefusedStreak{};
   if (track.accepted_ns > 0) {
@@ -265,6 +273,7 @@ FixOutcome EkfTracker::filter_fix(EkfTrack& track, const MapFix& fix) const {
   }
   update_antenna(filter, fix.antenna_map_m, R, lever_base_m_);
   accept(track, fix);
+  prove_heading(track, fix);
   return outcome;
 }
 
@@ -433,6 +442,7 @@ void EkfTracker::change_frame(EkfTrack& track,
       R_new_old * track.accepted_covariance_map_m2 * R_new_old.transpose();
   move(track.refused.last_map_m);
   move(track.refused_height.last_map_m);
+  track.aiding.prior_yaw_map_relative_rad += std::atan2(R_new_old(1, 0), R_new_old(0, 0));
 }
 
 }  // namespace trigpoint::gps_odometry

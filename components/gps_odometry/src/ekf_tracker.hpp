@@ -37,6 +37,8 @@ class EkfTracker {
   FixOutcome apply(EkfTrack& track, const MapFix& fix) const;
   /// Goes on from another filter's state; the phase becomes kRunning.
   void warm_start(EkfTrack& track, const WarmState& state) const;
+  FixOutcome apply(EkfTrack& track, const CheckedTwist& twist) const;
+  FixOutcome apply(EkfTrack& track, const CheckedYaw& yaw) const;
 
   /// Position of base_link with covariance as it may be published, order x y z roll pitch yaw about
   /// the axes of map.
@@ -66,6 +68,8 @@ class EkfTracker {
   void advance(EkfTrack& track, Nanoseconds stamp_ns) const;
   MotionNoise noise(const EkfTrack& track) const;
 
+  CoursePoint course_point(const EkfTrack& track, const MapFix& fix) const;
+  void prove_heading(EkfTrack& track, const MapFix& fix) const;
   FixOutcome align(EkfTrack& track, const MapFix& fix) const;
   void begin_running(EkfTrack& track, const MapFix& fix, const HeadingEstimate& heading) const;
   bool contradicts(const EkfTrack& track, const MapFix& fix) const;
@@ -84,6 +88,7 @@ class EkfTracker {
   Eigen::Vector3d lever_base_m_;
   double gate2_;  ///< chi-square limit, 2 degrees of freedom
   double gate1_;  ///< 1 degree of freedom
+  double gate3_;  ///< 3 degrees of freedom
 };
 
 }  // namespace trigpoint::gps_odometry

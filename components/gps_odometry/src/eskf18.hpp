@@ -10,6 +10,7 @@
 // and navigation", 2001, 5.2.3-18 (Joseph form), 8.2.3 (Gauss-Markov noise).
 #pragma once
 
+#include "covariance_watch.hpp"
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
@@ -43,6 +44,10 @@ struct Eskf18 {
 
   /// Numbers, and no negative variance.
   bool is_finite() const;
+
+  bool is_positive() const { return is_positive_covariance(P); }
+
+  void bound() { bound_position(P); }
 };
 
 /// Mean of gyro and accelerometer over an interval, base_link's axes, biases included.

@@ -26,6 +26,10 @@ class BufferedFilter : public Filter {
 
   FixOutcome insert(const MapFix& fix) override { return buffer_.insert(fix); }
 
+  FixOutcome insert(const CheckedTwist& twist) override { return buffer_.insert(twist); }
+
+  FixOutcome insert(const CheckedYaw& yaw) override { return buffer_.insert(yaw); }
+
   bool is_too_old(Nanoseconds stamp_ns) const override { return buffer_.is_too_old(stamp_ns); }
 
   bool has_fix_at(Nanoseconds stamp_ns) const override { return buffer_.has_fix_at(stamp_ns); }

@@ -26,6 +26,8 @@ class Filter {
   virtual void insert(const CheckedImu& imu) = 0;
   /// The fix must be neither too old nor a duplicate.
   virtual FixOutcome insert(const MapFix& fix) = 0;
+  virtual FixOutcome insert(const CheckedTwist& twist) = 0;
+  virtual FixOutcome insert(const CheckedYaw& yaw) = 0;
   virtual bool is_too_old(Nanoseconds stamp_ns) const = 0;
   virtual bool has_fix_at(Nanoseconds stamp_ns) const = 0;
   virtual std::optional<Nanoseconds> newest_imu_ns() const = 0;

@@ -22,6 +22,7 @@ struct CheckedFix {
   Eigen::Matrix3d covariance_enu_m2{Eigen::Matrix3d::Identity()};  ///< scaled, symmetric, positive
   GnssClass gnss_class{GnssClass::kUnknown};
   bool assumed_covariance{false};  ///< the receiver sent none
+  double stamp_sigma_s{0.0};       ///< where its clock is not the IMU's
 };
 
 struct FixVerdict {

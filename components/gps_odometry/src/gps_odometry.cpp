@@ -6,6 +6,8 @@
 #include "trigpoint/base/so3.hpp"
 #include "trigpoint/geodesy/local_frame.hpp"
 
+#include "admission.hpp"
+#include "aiding.hpp"
 #include "counters.hpp"
 #include "datum_election.hpp"
 #include "filter.hpp"
@@ -21,12 +23,7 @@ namespace trigpoint::gps_odometry {
 namespace {
 
 constexpr Nanoseconds kStatusInterval_ns = kNanosecondsPerSecond;
-// Fixes ahead of the IMU one after another mean that the IMU has stopped.
-constexpr int kSilentImuFixes = 3;
 constexpr double kFrozenSpeed_mps = 0.5;
-// A map's float32 points resolve 4 mm there; a datum farther off is a mistake (a sign, another
-// site's configuration) rather than a choice.
-constexpr double kFarthestDatum_m = 50'000.0;
 
 std::optional<Datum> configured_datum(const Config& config) {
   if (!config.use_configured_datum) {
@@ -53,24 +50,32 @@ struct GpsOdometry::Impl {
         datum(configured_datum(c)),
         imu_checks(c, robot.q_base_imu()),
         filter(make_filter(c, robot)),
-        election(c) {
+        election(c),
+        admission(c, robot),
+        geoid_undulation_m(robot.geoid_undulation_m) {
     if (datum) {
-      frame.emplace(*datum);
+      frame.emplace(make_frame(*datum, config));
     }
   }
 
   void take_imu(const ImuSample& sample, Output& output);
   void take_fix(const GnssFix& message, Output& output);
   std::optional<CheckedFix> checked(const GnssFix& message, Output& output);
-  bool is_untimely(const CheckedFix& fix, Output& output);
-  bool is_far_from_datum(const CheckedFix& fix, Output& output);
+  bool is_out_of_place(CheckedFix& fix, Nanoseconds stamp_ns, Output& output);
+  bool is_refused(const std::optional<Refusal>& refusal, Nanoseconds stamp_ns, Output& output);
+  void compare_turns(const MapFix& fix, Output& output);
+  template <typename Checked>
+  void take_aiding(const AidingVerdict<Checked>& verdict,
+                   const std::string& kind,
+                   Nanoseconds stamp_ns,
+                   Output& output);
   void refuse(const std::string& reason,
               const std::string& text,
               Nanoseconds stamp_ns,
               Output& output);
   MapFix place(const CheckedFix& fix) const;
   void elect(const CheckedFix& fix, Output& output);
-  void move_to(const Datum& new_datum);
+  void move_to(const Datum& new_datum, Output& output);
   void publish_odometry(Output& output);
   void try_warm_start(Output& output);
   Odometry odometry() const;
@@ -86,13 +91,12 @@ struct GpsOdometry::Impl {
   DatumElection election;
   FrozenReceiver frozen;
   WarmStartListener warm;
+  Admission admission;
+  double geoid_undulation_m;
   Counters counters;
   std::uint64_t fixes_received{0};
   std::uint64_t imu_received{0};
   Nanoseconds now_ns{0};
-  bool datum_is_near{false};  ///< a fix has confirmed it
-  int fixes_ahead{0};
-  Nanoseconds newest_ahead_ns{0};
   std::optional<Nanoseconds> published_ns;
   std::optional<Nanoseconds> status_ns;
 };
@@ -113,6 +117,9 @@ void GpsOdometry::Impl::refuse(const std::string& reason,
 
 void GpsOdometry::Impl::take_imu(const ImuSample& sample, Output& output) {
   ++imu_received;
+  if (is_refused(admission.check_frame(Source::kImu, sample.frame_id), sample.stamp_ns, output)) {
+    return;
+  }
   const ImuVerdict verdict = imu_checks.check(sample);
   if (!verdict.reason.empty()) {
     counters.add(verdict.reason);
@@ -127,8 +134,10 @@ void GpsOdometry::Impl::take_imu(const ImuSample& sample, Output& output) {
   if (verdict.sample) {
     election.begin(sample.stamp_ns);
     now_ns = filter->newest_imu_ns() ? std::max(now_ns, sample.stamp_ns) : sample.stamp_ns;
-    fixes_ahead = 0;
+    admission.hear_imu();
     filter->insert(*verdict.sample);
+    admission.turns.add_imu(
+        sample.stamp_ns, verdict.sample->raw_gyro_radps, verdict.sample->mean_accel_mps2);
     warm.advance(sample.stamp_ns);
     try_warm_start(output);
     publish_odometry(output);
@@ -142,12 +151,16 @@ void GpsOdometry::Impl::take_imu(const ImuSample& sample, Output& output) {
 // ---- fixes --------------------------------------------------------------------------------------
 
 std::optional<CheckedFix> GpsOdometry::Impl::checked(const GnssFix& message, Output& output) {
-  const FixVerdict verdict = check_fix(message, config);
+  if (is_refused(admission.check_frame(Source::kFix, message.frame_id), message.stamp_ns, output)) {
+    return std::nullopt;
+  }
+  GnssFix above_ellipsoid = message;
+  above_ellipsoid.altitude_m += geoid_undulation_m;
+  FixVerdict verdict = check_fix(above_ellipsoid, config);
   if (!verdict.reason.empty()) {
     refuse(verdict.reason, verdict.text, message.stamp_ns, output);
   }
-  if (!verdict.fix || is_untimely(*verdict.fix, output) ||
-      is_far_from_datum(*verdict.fix, output)) {
+  if (!verdict.fix || is_out_of_place(*verdict.fix, message.stamp_ns, output)) {
     return std::nullopt;
   }
   const bool moving =
@@ -165,79 +178,46 @@ std::optional<CheckedFix> GpsOdometry::Impl::checked(const GnssFix& message, Out
   return verdict.fix;
 }
 
-bool GpsOdometry::Impl::is_untimely(const CheckedFix& fix, Output& output) {
-  const auto imu_ns = filter->newest_imu_ns();
-  if (!imu_ns) {
-    // Its stamp cannot be judged yet.
-    refuse("before_imu", "Fix refused: there is no usable IMU sample yet.", fix.stamp_ns, output);
+/// In time, or on the map.
+bool GpsOdometry::Impl::is_out_of_place(CheckedFix& fix, Nanoseconds stamp_ns, Output& output) {
+  if (!filter->newest_imu_ns()) {
     now_ns = fix.stamp_ns;
-    return true;
   }
-  if (filter->has_fix_at(fix.stamp_ns)) {
-    refuse("duplicate_stamp",
-           "Fix refused: there was one with its stamp " + std::to_string(to_seconds(fix.stamp_ns)) +
-               " s already.",
-           fix.stamp_ns,
-           output);
-    return true;
-  }
-  if (filter->is_too_old(fix.stamp_ns)) {
-    refuse("too_old",
-           "Fix refused: it is " + std::to_string(to_seconds(now_ns - fix.stamp_ns)) +
-               " s old, expected at most " + std::to_string(config.rewind_s) + " s.",
-           fix.stamp_ns,
-           output);
-    return true;
-  }
-  if (fix.stamp_ns > *imu_ns + from_seconds(config.future_limit_s)) {
-    fixes_ahead = fix.stamp_ns > newest_ahead_ns ? fixes_ahead + 1 : 1;
-    newest_ahead_ns = fix.stamp_ns;
-    refuse("future_stamp",
-           "Fix refused: its stamp is " + std::to_string(to_seconds(fix.stamp_ns - *imu_ns)) +
-               " s ahead of the newest IMU sample, expected at most " +
-               std::to_string(config.future_limit_s) + " s.",
-           fix.stamp_ns,
-           output);
-    return true;
-  }
-  return false;
-}
-
-/// Only until one fix was near: a drive may lead far away from where its map begins.
-bool GpsOdometry::Impl::is_far_from_datum(const CheckedFix& fix, Output& output) {
-  if (!datum || datum_is_near) {
-    return false;
-  }
-  const auto p = frame->to_map(fix.place);
-  const double distance_m = p ? p->norm() : kNaN;
-  datum_is_near = distance_m <= kFarthestDatum_m;
-  if (!datum_is_near) {
-    refuse("far_from_datum",
-           "Fix refused: it is " + std::to_string(distance_m * 1e-3) + " km from the datum " +
-               datum->id() +
-               ", expected at most 50; is a sign or the order of latitude and "
-               "longitude wrong, or the datum another place's?",
-           fix.stamp_ns,
-           output);
-  }
-  return !datum_is_near;
+  return is_refused(admission.check_clock(fix, filter->newest_imu_ns(), output.events),
+                    stamp_ns,
+                    output) ||
+         is_refused(admission.check_order(fix, *filter), stamp_ns, output) ||
+         is_refused(admission.check_place(
+                        fix, frame ? &*frame : nullptr, datum.has_value(), output.events),
+                    stamp_ns,
+                    output);
 }
 
 MapFix GpsOdometry::Impl::place(const CheckedFix& fix) const {
   const Eigen::Matrix3d R = frame->R_map_enu(fix.place);
-  return {fix,
-          frame->to_map(fix.place).value_or(Eigen::Vector3d::Zero()),
-          R * fix.covariance_enu_m2 * R.transpose()};
+  MapFix placed{fix,
+                frame->to_map(fix.place).value_or(Eigen::Vector3d::Zero()),
+                R * fix.covariance_enu_m2 * R.transpose()};
+  if (fix.stamp_sigma_s > 0.0) {
+    placed.covariance_map_m2 += stamp_covariance_m2(fix.stamp_sigma_s, *filter);
+  }
+  return placed;
 }
 
 void GpsOdometry::Impl::take_fix(const GnssFix& message, Output& output) {
   ++fixes_received;
   if (const auto fix = checked(message, output)) {
     if (!frame) {
-      frame.emplace(
-          Datum{fix->place.latitude_deg, fix->place.longitude_deg, fix->place.height_m, 0});
+      frame.emplace(make_frame(
+          Datum{fix->place.latitude_deg, fix->place.longitude_deg, fix->place.height_m, 0},
+          config));
     }
-    const FixOutcome outcome = filter->insert(place(*fix));
+    const MapFix placed = place(*fix);
+    const FixOutcome outcome = filter->insert(placed);
+    if (outcome.reason != "teleport") {
+      // What a wrong gyro makes of the filter, the gate would hide.
+      compare_turns(placed, output);
+    }
     if (!outcome.reason.empty()) {
       // Counted in the Track, because a later rewind may decide otherwise.
       output.events.push_back({outcome.accepted ? Severity::kInfo : Severity::kWarning,
@@ -251,6 +231,42 @@ void GpsOdometry::Impl::take_fix(const GnssFix& message, Output& output) {
   status_ns = now_ns;
 }
 
+bool GpsOdometry::Impl::is_refused(const std::optional<Refusal>& refusal,
+                                   Nanoseconds stamp_ns,
+                                   Output& output) {
+  if (refusal && refusal->text.empty()) {
+    counters.add(refusal->reason);
+  } else if (refusal) {
+    refuse(refusal->reason, refusal->text, stamp_ns, output);
+  }
+  return refusal.has_value();
+}
+
+void GpsOdometry::Impl::compare_turns(const MapFix& fix, Output& output) {
+  const double sigma_m = std::sqrt(fix.covariance_map_m2.diagonal().head<2>().maxCoeff());
+  const TurnVerdict verdict =
+      admission.turns.add_fix(fix.checked.stamp_ns, fix.antenna_map_m.head<2>(), sigma_m);
+  if (!verdict.reason.empty()) {
+    imu_checks.condemn(verdict.reason, verdict.text);
+    output.events.push_back({Severity::kError, fix.checked.stamp_ns, verdict.reason, verdict.text});
+  }
+}
+
+template <typename Checked>
+void GpsOdometry::Impl::take_aiding(const AidingVerdict<Checked>& verdict,
+                                    const std::string& kind,
+                                    Nanoseconds stamp_ns,
+                                    Output& output) {
+  if (!verdict.measurement) {
+    refuse(verdict.reason, verdict.text, stamp_ns, output);
+  } else if (!is_refused(admission.check_time(kind, stamp_ns, *filter), stamp_ns, output)) {
+    const FixOutcome outcome = filter->insert(*verdict.measurement);
+    if (outcome.reason.starts_with(kind + "_")) {  // others are counted in the Track
+      refuse(outcome.reason, outcome.text, stamp_ns, output);
+    }
+  }
+}
+
 // ---- datum --------------------------------------------------------------------------------------
 
 void GpsOdometry::Impl::elect(const CheckedFix& fix, Output& output) {
@@ -258,7 +274,7 @@ void GpsOdometry::Impl::elect(const CheckedFix& fix, Output& output) {
     return;
   }
   if (const auto elected = election.add(fix)) {
-    move_to(*elected);
+    move_to(*elected, output);
     output.elected = elected;
     output.events.push_back({Severity::kInfo,
                              fix.stamp_ns,
@@ -268,8 +284,8 @@ void GpsOdometry::Impl::elect(const CheckedFix& fix, Output& output) {
   }
 }
 
-void GpsOdometry::Impl::move_to(const Datum& new_datum) {
-  geodesy::LocalFrame new_frame(new_datum);
+void GpsOdometry::Impl::move_to(const Datum& new_datum, Output& output) {
+  geodesy::LocalFrame new_frame = make_frame(new_datum, config);
   if (frame) {
     const geodesy::Geographic old_origin = place_of(frame->datum());
     const Eigen::Matrix3d R = new_frame.R_map_enu(old_origin);
@@ -281,6 +297,10 @@ void GpsOdometry::Impl::move_to(const Datum& new_datum) {
   }
   frame = std::move(new_frame);
   datum = new_datum;
+  admission.turns.restart();
+  if (const auto event = projection_event(*frame, config, now_ns)) {
+    output.events.push_back(*event);
+  }
 }
 
 // ---- warm start ---------------------------------------------------------------------------------
@@ -366,7 +386,7 @@ Surroundings GpsOdometry::Impl::around() const {
   return {now_ns,
           datum.has_value(),
           imu_checks.is_faulty(),
-          fixes_ahead >= kSilentImuFixes,
+          admission.imu_is_silent(),
           filter->is_doubtful()};
 }
 
@@ -411,6 +431,22 @@ Output GpsOdometry::on_fix(const GnssFix& fix) {
   return output;
 }
 
+Output GpsOdometry::on_twist(const TwistMeasurement& twist) {
+  Output output;
+  Impl& impl = *impl_;
+  const auto refusal = impl.admission.check_frame(Source::kTwist, twist.frame_id);
+  if (!impl.is_refused(refusal, twist.stamp_ns, output)) {
+    impl.take_aiding(check_twist(twist, impl.config), "twist", twist.stamp_ns, output);
+  }
+  return output;
+}
+
+Output GpsOdometry::on_yaw(const YawMeasurement& yaw) {
+  Output output;
+  impl_->take_aiding(check_yaw(yaw, impl_->config), "yaw", yaw.stamp_ns, output);
+  return output;
+}
+
 Output GpsOdometry::on_datum(const Datum& candidate) {
   Output output;
   Impl& impl = *impl_;
@@ -419,7 +455,7 @@ Output GpsOdometry::on_datum(const Datum& candidate) {
     return output;
   }
   if (!impl.datum) {
-    impl.move_to(candidate);
+    impl.move_to(candidate, output);
     output.events.push_back({Severity::kInfo,
                              impl.now_ns,
                              "datum_adopted",
@@ -434,7 +470,7 @@ Output GpsOdometry::on_datum(const Datum& candidate) {
          "datum_conflict",
          "Two data were elected: the older, " + kept + ", holds; " + dropped + " is dropped."});
     if (adopts) {
-      impl.move_to(candidate);
+      impl.move_to(candidate, output);
     }
   }
   return output;

@@ -22,6 +22,13 @@ constexpr Nanoseconds kLongestWay_ns = 60 * kNanosecondsPerSecond;
 // Mounting and slip: course over ground is not heading.
 constexpr double kCourseSigma_rad = 0.035;
 
+// A heading that was heard is given up only on good evidence.
+constexpr double kProofBaseline = 4.0;
+constexpr double kContradiction_rad = 0.35;
+constexpr double kContradiction_sigmas = 3.0;
+constexpr Nanoseconds kDistrust_ns = 60 * kNanosecondsPerSecond;
+constexpr double kLongestStep_s = 2.5;
+
 Complex complex_of(const Eigen::Vector2d& v) {
   return {v.x(), v.y()};
 }
@@ -93,6 +100,44 @@ void HeadingSearch::change_frame(const Eigen::Matrix2d& R_new_old,
     Eigen::Vector2d& antenna = points_[static_cast<std::size_t>(i)].antenna_map_m;
     antenna = R_new_old * antenna + t_new_old;
   }
+}
+
+std::optional<HeadingEstimate> heard_heading(const AidingState& aiding,
+                                             const Eigen::Vector2d& step_map_m,
+                                             double elapsed_s,
+                                             double sigma_m) {
+  if (!aiding.has_prior || !(elapsed_s > 0.0) || elapsed_s > kLongestStep_s) {
+    return std::nullopt;
+  }
+  HeadingEstimate heading;
+  heading.heard = true;
+  heading.yaw_map_relative_rad = aiding.prior_yaw_map_relative_rad;
+  heading.sigma_rad = aiding.prior_sigma_rad;
+  heading.velocity_map_mps = step_map_m / elapsed_s;
+  heading.speed_mps = heading.velocity_map_mps.norm();
+  heading.speed_sigma_mps = std::numbers::sqrt2 * sigma_m / elapsed_s + 0.5;
+  return heading;
+}
+
+std::optional<HeadingEstimate> contradiction(HeadingSearch& search,
+                                             AidingState& aiding,
+                                             const CoursePoint& point,
+                                             double yaw_sigma_rad,
+                                             const Config& config) {
+  Config longer = config;
+  longer.heading_baseline_m *= kProofBaseline;
+  const auto motion = search.add(point, longer);
+  if (!motion) {
+    return std::nullopt;
+  }
+  aiding.heading_unproven = false;
+  const double limit = std::max(
+      kContradiction_rad, kContradiction_sigmas * std::hypot(motion->sigma_rad, yaw_sigma_rad));
+  if (std::abs(wrap_angle(motion->yaw_map_relative_rad)) < limit) {
+    return std::nullopt;
+  }
+  aiding.yaw_distrusted_until_ns = point.stamp_ns + kDistrust_ns;
+  return motion;
 }
 
 }  // namespace trigpoint::gps_odometry

@@ -7,6 +7,7 @@
 #include "trigpoint/base/time.hpp"
 #include "trigpoint/gps_odometry/config.hpp"
 
+#include "aiding.hpp"
 #include <Eigen/Core>
 
 #include <array>
@@ -28,6 +29,9 @@ struct HeadingEstimate {
   double sigma_rad{0.0};
   double speed_mps{0.0};  ///< over the newest leg
   double speed_sigma_mps{0.0};
+  /// Heard, not found from motion: then the velocity is this, in map, and not along the heading.
+  bool heard{false};
+  Eigen::Vector2d velocity_map_mps{Eigen::Vector2d::Zero()};
 };
 
 /// Keeps the way of the last points, thinned to legs that say something. Plain data: copied with
@@ -49,5 +53,20 @@ class HeadingSearch {
   std::array<CoursePoint, kPoints> points_;
   int size_{0};
 };
+
+/// A heading that was heard, for a vehicle that moved by `step_map_m` in `elapsed_s`; nullopt where
+/// none was, or the velocity is not known.
+std::optional<HeadingEstimate> heard_heading(const AidingState& aiding,
+                                             const Eigen::Vector2d& step_map_m,
+                                             double elapsed_s,
+                                             double sigma_m);
+
+/// Compares a heading that was heard with motion; the way must be several times as long as the one
+/// that finds a heading. The estimate by motion when the two contradict each other.
+std::optional<HeadingEstimate> contradiction(HeadingSearch& search,
+                                             AidingState& aiding,
+                                             const CoursePoint& point,
+                                             double yaw_sigma_rad,
+                                             const Config& config);
 
 }  // namespace trigpoint::gps_odometry

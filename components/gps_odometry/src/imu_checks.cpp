@@ -24,6 +24,7 @@ constexpr double kGUnitsBelow_mps2 = 1.5;
 constexpr double kGUnitsAbove_mps2 = 0.5;
 constexpr double kUpsideDown_mps2 = -4.0;
 constexpr int kStuckSamples = 20;
+constexpr double kNearLimit = 0.98;
 // A stamp this far from the last one is believed when the next ones follow it.
 constexpr Nanoseconds kJump_ns = kNanosecondsPerSecond;
 constexpr int kJumpSamples = 3;
@@ -47,6 +48,11 @@ double spread(const Vector3d& sum, const Vector3d& square, int count) {
 }
 
 }  // namespace
+
+bool is_saturated(const CheckedImu& imu, const Config& config) {
+  return imu.raw_gyro_radps.cwiseAbs().maxCoeff() >= kNearLimit * config.eskf18.gyro_limit_radps ||
+         imu.accel_mps2.cwiseAbs().maxCoeff() >= kNearLimit * config.eskf18.accel_limit_mps2;
+}
 
 RestBias::RestBias(const Config& config)
     : rest_sigma_radps_(config.gyro_bias_rest_sigma_radps),
@@ -94,7 +100,15 @@ ImuChecks::ImuChecks(const Config& config, const Eigen::Quaterniond& q_base_imu)
       rest_(config),
       previous_(Eigen::Matrix<double, 6, 1>::Constant(kNaN)) {}
 
+void ImuChecks::condemn(const std::string& reason, const std::string& text) {
+  fault_ = reason;
+  condemned_text_ = text;
+}
+
 ImuVerdict ImuChecks::check(const ImuSample& sample) {
+  if (!condemned_text_.empty()) {
+    return {std::nullopt, fault_, condemned_text_, false};
+  }
   if (!sample.gyro_radps.allFinite() || !sample.accel_mps2.allFinite()) {
     return refuse(
         "imu_not_finite", "IMU sample refused: a value is %g, expected finite numbers.", kNaN);

@@ -35,6 +35,9 @@ struct CheckedImu {
   std::optional<QuietWindow> quiet;                         ///< just ended
 };
 
+/// At the limit of an axis: motion was more than the sample says.
+bool is_saturated(const CheckedImu& imu, const Config& config);
+
 struct ImuVerdict {
   std::optional<CheckedImu> sample;  ///< nullopt: refused, or still warming up
   std::string reason;                ///< name of the counter; empty while warming up
@@ -84,6 +87,9 @@ class ImuChecks {
   /// The last samples were refused because of what the IMU is or how it is mounted.
   bool is_faulty() const { return !fault_.empty(); }
 
+  /// What others found about it; from now on every sample is refused for that reason.
+  void condemn(const std::string& reason, const std::string& text);
+
  private:
   ImuVerdict check_stamp(const ImuSample& sample);
   ImuVerdict check_mean();
@@ -98,6 +104,7 @@ class ImuChecks {
   int warm_up_{0};
   Eigen::Vector3d mean_accel_mps2_{Eigen::Vector3d::Zero()};
   std::string fault_;
+  std::string condemned_text_;  ///< not empty: fault_ stays
   Eigen::Matrix<double, 6, 1> previous_;
   int identical_{0};
 };

@@ -106,13 +106,12 @@ FixOutcome InsTracker::align(InsTrack& track, const MapFix& fix) const {
     track.speed_mps = step.head<2>().norm() / elapsed_s;
   }
   follow_receiver(track, fix);
-  CoursePoint point;
-  point.stamp_ns = fix.checked.stamp_ns;
-  point.antenna_map_m = fix.antenna_map_m.head<2>();
-  point.sigma_m = std::sqrt(fix.covariance_map_m2.diagonal().head<2>().maxCoeff());
-  point.yaw_relative_rad = yaw(track.filter);
-  point.lever_relative_m = (track.filter.q_map_base * lever_base_m_).head<2>();
-  if (const auto heading = track.heading.add(point, config_)) {
+  const CoursePoint point = course_point(track, fix);
+  auto heading = track.heading.add(point, config_);
+  if (!heading && track.accepted_ns > 0) {
+    heading = heard_heading(track.aiding, step.head<2>(), elapsed_s, point.sigma_m);
+  }
+  if (heading) {
     begin_running(track, fix, *heading);
   }
   accept(track, fix);
@@ -124,7 +123,9 @@ FixOutcome InsTracker::align(InsTrack& track, const MapFix& fix) const {
 void InsTracker::begin_running(InsTrack& track,
                                const MapFix& fix,
                                const HeadingEstimate& heading) const {
-  const Vector3d before = aligning_estimate(track).T_map_base.p;
+  const bool searching = track.phase == Phase::kAligning;
+  const Vector3d before = searching ? aligning_estimate(track).T_map_base.p : track.filter.p_map_m;
+  const double yaw_before = searching ? 0.0 : yaw(track.filter);
   const auto H = body_velocity_jacobian(track.filter, Vector3d::Zero());
   const double own_mps = (track.filter.q_map_base.conjugate() * track.filter.v_map_mps).x();
   const double own_variance = (H * track.filter.P * H.transpose())(0, 0);
@@ -132,6 +133,9 @@ void InsTracker::begin_running(InsTrack& track,
     set_heading(filter, turn_rad, heading.sigma_rad);
     const double course = yaw(track.filter);
     filter.v_map_mps = heading.speed_mps * Vector3d(std::cos(course), std::sin(course), 0.0);
+    if (heading.heard) {
+      filter.v_map_mps << heading.velocity_map_mps, 0.0;
+    }
     reset_block(filter,
                 ins::kVelocity,
                 heading.speed_sigma_mps * heading.speed_sigma_mps * Matrix3d::Identity());
@@ -152,17 +156,26 @@ void InsTracker::begin_running(InsTrack& track,
   const double variance = own_variance + heading.speed_sigma_mps * heading.speed_sigma_mps;
   track.log_ratio =
       std::clamp(2.0 * own_mps * heading.speed_mps / variance, -2.0 * kDecided, 2.0 * kDecided);
+  if (heading.heard) {
+    track.log_ratio = kDecided;  // it has no opposite; motion must confirm it
+  } else if (!searching) {
+    track.log_ratio = 0.0;  // the velocity was the fixes', and says nothing about the heading
+  }
   if (track.log_ratio < 0.0) {
     std::swap(track.filter, track.rival);
     track.log_ratio = -track.log_ratio;
   }
   track.has_rival = track.log_ratio < kDecided;
   track.phase = Phase::kRunning;
+  track.yaw_weighed = false;
+  track.heading.restart();
+  track.aiding.has_prior = false;
+  track.aiding.heading_unproven = heading.heard;
   track.refused = RefusedStreak{};
   track.parts = {};
   if (track.accepted_ns > 0) {
     ++track.reset.counter;
-    track.reset.delta = {wrap_angle(yaw(track.filter)), track.filter.p_map_m - before};
+    track.reset.delta = {wrap_angle(yaw(track.filter) - yaw_before), track.filter.p_map_m - before};
     track.reset_ns = fix.checked.stamp_ns;
   }
 }
@@ -297,6 +310,7 @@ FixOutcome InsTracker::filter_fix(InsTrack& track, const MapFix& fix) const {
                 std::to_string(gate_[kHorizontal]) + " (2 degrees of freedom)."};
   }
   accept(track, fix);
+  prove_heading(track, fix);
   if (clipped[kVertical]) {
     ++track.used_without_height;
     return {true,

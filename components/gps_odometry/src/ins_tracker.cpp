@@ -26,7 +26,6 @@ constexpr double kGapRate_radps = 0.3;   // unknown motion in a gap
 constexpr double kGapAccel_mps2 = 2.0;
 constexpr double kSaturatedGyro_radps_sqrthz = 0.3;  // some rad/s and g for a hundredth of a second
 constexpr double kSaturatedAccel_mps2_sqrthz = 5.0;
-constexpr double kNearLimit = 0.98;
 constexpr double kLevelSigma_mps2 = 2.0;  // manoeuvres while nothing but gravity levels
 constexpr double kSlowDecay = 1e6;        // an absorbed jump stays
 // Rest, research/gps C5; each is widened by what the filter knows.
@@ -44,7 +43,8 @@ InsTracker::InsTracker(const Config& config, const Vector3d& lever_base_m)
       lever_base_m_(lever_base_m),
       gate_{chi_square_limit_2(config.gate_probability),
             chi_square_limit_1(config.gate_probability)},
-      gate_axis_(chi_square_limit_1(config.gate_probability)) {}
+      gate_axis_(chi_square_limit_1(config.gate_probability)),
+      gate3_(chi_square_limit_3(config.gate_probability)) {}
 
 // ---- IMU ----------------------------------------------------------------------------------------
 
@@ -64,6 +64,7 @@ void InsTracker::start(InsTrack& track, const CheckedImu& imu) const {
       Vector3d::Ones();
   track.filter.P = sigma.cwiseAbs2().asDiagonal();
   track.heading.restart();
+  track.aiding = AidingState{};
   // The IMU's clock may have moved: what was stamped before says nothing any more.
   track.no_side_slip_ns = track.doubt_until_ns = 0;
   track.parts = {};
@@ -149,7 +150,7 @@ void InsTracker::step(InsTrack& track, const CheckedImu& imu, double gap_s, bool
 
 void InsTracker::apply(InsTrack& track, const CheckedImu& imu) const {
   const double gap_s = to_seconds(imu.stamp_ns - track.imu_ns);
-  const bool saturated = is_saturated(imu);
+  const bool saturated = is_saturated(imu, config_);
   if (track.phase == Phase::kNoImu || gap_s > kRestartGap_s) {
     start(track, imu);
   } else {
@@ -167,11 +168,6 @@ void InsTracker::apply(InsTrack& track, const CheckedImu& imu) const {
   } else if (gap_s <= kShortGap_s) {
     constrain(track, imu);
   }
-}
-
-bool InsTracker::is_saturated(const CheckedImu& imu) const {
-  return imu.raw_gyro_radps.cwiseAbs().maxCoeff() >= kNearLimit * config_.eskf18.gyro_limit_radps ||
-         imu.accel_mps2.cwiseAbs().maxCoeff() >= kNearLimit * config_.eskf18.accel_limit_mps2;
 }
 
 bool InsTracker::is_at_rest(const InsTrack& track, const QuietWindow& quiet) const {
@@ -216,7 +212,7 @@ void InsTracker::constrain(InsTrack& track, const CheckedImu& imu) const {
     return;
   }
   const double speed = track.filter.v_map_mps.norm();
-  if (c.no_side_slip && speed > c.no_side_slip_speed_mps &&
+  if (c.no_side_slip && !track.aiding.heading_unproven && speed > c.no_side_slip_speed_mps &&
       filter_yaw_sigma_rad(track) < c.no_side_slip_yaw_sigma_rad) {
     track.no_side_slip_ns = imu.stamp_ns;
     const double sigma = std::hypot(c.no_side_slip_sigma_mps, c.no_side_slip_share * speed);
@@ -339,6 +335,7 @@ void InsTracker::change_frame(InsTrack& track,
   track.accepted_covariance_map_m2 =
       R_new_old * track.accepted_covariance_map_m2 * R_new_old.transpose();
   move(track.refused.last_map_m);
+  track.aiding.prior_yaw_map_relative_rad += std::atan2(R_new_old(1, 0), R_new_old(0, 0));
   for (Contradiction& part : track.parts) {
     move(part.streak.last_map_m);
   }

@@ -36,7 +36,8 @@ struct InsTrack : Track {
   /// The same with the heading turned round, until the data decide (a start in reverse).
   Eskf18 rival;
   bool has_rival{false};
-  double log_ratio{0.0};  ///< of the likelihoods, filter to rival
+  double log_ratio{0.0};    ///< of the likelihoods, filter to rival
+  bool yaw_weighed{false};  ///< a heading that was heard has been weighed between them
 
   Eigen::Vector3d fix_variance_m2{Eigen::Vector3d::Zero()};   ///< of the newest fix; 0: none yet
   Eigen::Vector3d held_variance_m2{Eigen::Vector3d::Zero()};  ///< peak hold of it
@@ -58,6 +59,8 @@ class InsTracker {
   FixOutcome apply(InsTrack& track, const MapFix& fix) const;
   /// Goes on from another filter's state; the phase becomes kRunning.
   void warm_start(InsTrack& track, const WarmState& state) const;
+  FixOutcome apply(InsTrack& track, const CheckedTwist& twist) const;
+  FixOutcome apply(InsTrack& track, const CheckedYaw& yaw) const;
 
   Estimate estimate(const InsTrack& track) const;
 
@@ -88,9 +91,13 @@ class InsTracker {
   InsNoise noise(const InsTrack& track) const;
   void advance(InsTrack& track, Nanoseconds stamp_ns) const;
   void step(InsTrack& track, const CheckedImu& imu, double gap_s, bool saturated) const;
-  bool is_saturated(const CheckedImu& imu) const;
   bool is_at_rest(const InsTrack& track, const QuietWindow& quiet) const;
   void constrain(InsTrack& track, const CheckedImu& imu) const;
+
+  // ins_aiding.cpp: optional inputs.
+  void weigh_yaw(InsTrack& track, const CheckedYaw& yaw) const;
+  CoursePoint course_point(const InsTrack& track, const MapFix& fix) const;
+  void prove_heading(InsTrack& track, const MapFix& fix) const;
 
   // ins_fixes.cpp: fixes and heading.
   FixOutcome align(InsTrack& track, const MapFix& fix) const;
@@ -132,6 +139,7 @@ class InsTracker {
   Eigen::Vector3d lever_base_m_;
   std::array<double, 2> gate_;  ///< chi-square limits, by part
   double gate_axis_;            ///< 1 degree of freedom
+  double gate3_;                ///< 3 degrees of freedom
 };
 
 }  // namespace trigpoint::gps_odometry

@@ -9,6 +9,7 @@
 #include "track.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <deque>
 #include <iterator>
 #include <optional>
@@ -28,6 +29,10 @@ class RewindBuffer {
 
   /// The outcome at the fix's own epoch. The fix must be neither too old nor a duplicate.
   FixOutcome insert(const MapFix& fix);
+
+  /// Neither may be too old.
+  FixOutcome insert(const CheckedTwist& twist);
+  FixOutcome insert(const CheckedYaw& yaw);
 
   bool is_too_old(Nanoseconds stamp_ns) const;
   bool has_fix_at(Nanoseconds stamp_ns) const;
@@ -50,7 +55,8 @@ class RewindBuffer {
   void announce_reset(const YawPose& delta);
 
  private:
-  using Measurement = std::variant<CheckedImu, MapFix>;  // in the order of equal stamps
+  using Measurement =
+      std::variant<CheckedImu, MapFix, CheckedTwist, CheckedYaw>;  // in the order of equal stamps
 
   struct Entry {
     Nanoseconds stamp_ns{0};
@@ -59,7 +65,8 @@ class RewindBuffer {
   };
 
   FixOutcome insert(Nanoseconds stamp_ns, const Measurement& measurement);
-  FixOutcome apply(Entry& entry, const State& before) const;
+  FixOutcome apply(Entry& entry, const State& before);
+  void watch(Entry& entry, const State& before);
   void forget_old();
 
   const TrackerType& tracker_;
@@ -67,6 +74,7 @@ class RewindBuffer {
   State before_;  ///< the state before the oldest entry
   std::deque<Entry> entries_;
   std::optional<Nanoseconds> newest_imu_ns_;
+  std::optional<State> sound_;  ///< the newest state whose covariance was found positive
 };
 
 template <typename TrackerType>
@@ -83,6 +91,20 @@ void RewindBuffer<TrackerType>::insert(const CheckedImu& imu) {
 template <typename TrackerType>
 FixOutcome RewindBuffer<TrackerType>::insert(const MapFix& fix) {
   const FixOutcome outcome = insert(fix.checked.stamp_ns, fix);
+  forget_old();
+  return outcome;
+}
+
+template <typename TrackerType>
+FixOutcome RewindBuffer<TrackerType>::insert(const CheckedTwist& twist) {
+  const FixOutcome outcome = insert(twist.stamp_ns, twist);
+  forget_old();
+  return outcome;
+}
+
+template <typename TrackerType>
+FixOutcome RewindBuffer<TrackerType>::insert(const CheckedYaw& yaw) {
+  const FixOutcome outcome = insert(yaw.stamp_ns, yaw);
   forget_old();
   return outcome;
 }
@@ -110,13 +132,17 @@ FixOutcome RewindBuffer<TrackerType>::insert(Nanoseconds stamp_ns, const Measure
 }
 
 template <typename TrackerType>
-FixOutcome RewindBuffer<TrackerType>::apply(Entry& entry, const State& before) const {
+FixOutcome RewindBuffer<TrackerType>::apply(Entry& entry, const State& before) {
   entry.after = before;
   FixOutcome outcome;
   if (const auto* imu = std::get_if<CheckedImu>(&entry.measurement)) {
     tracker_.apply(entry.after, *imu);
+  } else if (const auto* fix = std::get_if<MapFix>(&entry.measurement)) {
+    outcome = tracker_.apply(entry.after, *fix);
+  } else if (const auto* twist = std::get_if<CheckedTwist>(&entry.measurement)) {
+    outcome = tracker_.apply(entry.after, *twist);
   } else {
-    outcome = tracker_.apply(entry.after, std::get<MapFix>(entry.measurement));
+    outcome = tracker_.apply(entry.after, std::get<CheckedYaw>(entry.measurement));
   }
   if (!entry.after.filter.is_finite()) {
     // Cannot be, and must not spread if it is: start again from the next sample.
@@ -125,8 +151,44 @@ FixOutcome RewindBuffer<TrackerType>::apply(Entry& entry, const State& before) c
     ++entry.after.not_finite;
     ++entry.after.reset.counter;
     outcome = {false, "state_not_finite", "The filter's state was not finite; it starts again."};
+  } else {
+    watch(entry, before);
   }
   return outcome;
+}
+
+/// Once a second of data time: bounds the covariance, and goes back to the last state whose
+/// covariance was positive when it is not. The prediction from there bridges the gap and says so in
+/// its covariance.
+template <typename TrackerType>
+void RewindBuffer<TrackerType>::watch(Entry& entry, const State& before) {
+  const auto* imu = std::get_if<CheckedImu>(&entry.measurement);
+  if (imu == nullptr || entry.after.phase == Phase::kNoImu ||
+      entry.stamp_ns / kNanosecondsPerSecond == before.stamp_ns / kNanosecondsPerSecond) {
+    return;
+  }
+  entry.after.filter.bound();
+  if (entry.after.filter.is_positive()) {
+    sound_ = entry.after;
+    return;
+  }
+  const Track kept = before;
+  entry.after = before;
+  if (sound_ && sound_->stamp_ns <= entry.stamp_ns) {
+    entry.after = *sound_;
+    static_cast<Track&>(entry.after) = kept;
+    entry.after.stamp_ns = sound_->stamp_ns;
+    entry.after.imu_ns = sound_->imu_ns;
+    entry.after.phase = sound_->phase;
+    tracker_.apply(entry.after, *imu);
+  }
+  if (!entry.after.filter.is_finite() || !entry.after.filter.is_positive()) {
+    entry.after.phase = Phase::kNoImu;
+  }
+  ++entry.after.restored;
+  ++entry.after.reset.counter;
+  entry.after.reset.delta = {};
+  entry.after.reset_ns = entry.stamp_ns;
 }
 
 template <typename TrackerType>
@@ -156,22 +218,30 @@ void RewindBuffer<TrackerType>::restart() {
   fresh.phase = Phase::kNoImu;
   fresh.stamp_ns = fresh.imu_ns = fresh.accepted_ns = fresh.refused_ns = fresh.reset_ns = 0;
   fresh.refused = fresh.refused_height = RefusedStreak{};
+  fresh.aiding = AidingState{};
   ++fresh.reset.counter;
   fresh.reset.delta = {};
   before_ = fresh;
   entries_.clear();
   newest_imu_ns_.reset();
+  sound_.reset();
 }
 
 template <typename TrackerType>
 void RewindBuffer<TrackerType>::change_frame(const Eigen::Matrix3d& R_new_old,
                                              const Eigen::Vector3d& t_new_old) {
+  const double turn_rad = std::atan2(R_new_old(1, 0), R_new_old(0, 0));
   tracker_.change_frame(before_, R_new_old, t_new_old);
+  if (sound_) {
+    tracker_.change_frame(*sound_, R_new_old, t_new_old);
+  }
   for (Entry& entry : entries_) {
     tracker_.change_frame(entry.after, R_new_old, t_new_old);
     if (auto* fix = std::get_if<MapFix>(&entry.measurement)) {
       fix->antenna_map_m = R_new_old * fix->antenna_map_m + t_new_old;
       fix->covariance_map_m2 = R_new_old * fix->covariance_map_m2 * R_new_old.transpose();
+    } else if (auto* yaw = std::get_if<CheckedYaw>(&entry.measurement)) {
+      yaw->yaw_map_rad += turn_rad;
     }
   }
 }

@@ -61,6 +61,10 @@ std::vector<NamedCount> rejections_of(const Track& track, const Counters& messag
   add("used_without_height", track.used_without_height);
   add("recovered", track.recoveries);
   add("state_not_finite", track.not_finite);
+  add("covariance_restored", track.restored);
+  add("twist_gate", track.twists_refused);
+  add("yaw_gate", track.yaws_refused);
+  add("yaw_contradicted", track.yaws_contradicted);
   std::sort(counts.begin(), counts.end(), [](const NamedCount& a, const NamedCount& b) {
     return a.name < b.name;
   });

@@ -123,6 +123,14 @@ FixOutcome StrictFilter::insert(const MapFix& fix) {
   return {true, "", ""};
 }
 
+FixOutcome StrictFilter::insert(const CheckedTwist&) {
+  return {false, "twist_not_an_input", "Refused: the published filter has no such input here."};
+}
+
+FixOutcome StrictFilter::insert(const CheckedYaw&) {
+  return {false, "yaw_not_an_input", "Refused: the published filter has no such input here."};
+}
+
 void StrictFilter::tick(Nanoseconds now_ns) {
   replay_.tick(now_ns);
   tick_ns_ = now_ns;

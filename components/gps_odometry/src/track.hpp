@@ -7,6 +7,7 @@
 #include "trigpoint/base/messages.hpp"
 #include "trigpoint/gps_odometry/config.hpp"
 
+#include "aiding.hpp"
 #include "fix_checks.hpp"
 #include <Eigen/Core>
 
@@ -60,6 +61,8 @@ struct Track {
   ResetInfo reset;
   Nanoseconds reset_ns{0};
 
+  AidingState aiding;
+
   std::uint64_t accepted{0};
   std::uint64_t refused_gate{0};
   std::uint64_t refused_teleport{0};
@@ -67,6 +70,10 @@ struct Track {
   std::uint64_t used_without_height{0};
   std::uint64_t recoveries{0};
   std::uint64_t not_finite{0};  ///< restarts after a step that was not finite
+  std::uint64_t restored{0};    ///< covariances that were not positive
+  std::uint64_t twists_refused{0};
+  std::uint64_t yaws_refused{0};
+  std::uint64_t yaws_contradicted{0};
 };
 
 /// Begun from another filter's odometry, and no fix has confirmed it since.

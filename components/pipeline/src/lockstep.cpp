@@ -45,6 +45,10 @@ struct Lockstep::Impl {
     take(gps.on_fix(fix), step);
   }
 
+  void feed(const TwistMeasurement& twist, Step& step) { take(gps.on_twist(twist), step); }
+
+  void feed(const YawMeasurement& yaw, Step& step) { take(gps.on_yaw(yaw), step); }
+
   void feed(const PointCloudMessage& cloud, Step& step) { take(mapper.on_cloud(cloud), step); }
 
   void take(gps_odometry::Output&& output, Step& step) {

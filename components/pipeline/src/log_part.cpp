@@ -22,6 +22,10 @@ void LogPart::on_entry(const recording::LogEntry& entry) {
     ++(entry.withheld ? fixes_withheld_ : fixes_fed_);
   } else if (std::holds_alternative<ImuSample>(entry.measurement)) {
     ++imu_;
+  } else if (std::holds_alternative<TwistMeasurement>(entry.measurement)) {
+    ++twists_;
+  } else if (std::holds_alternative<YawMeasurement>(entry.measurement)) {
+    ++yaws_;
   } else {
     ++sweeps_;
   }
@@ -38,16 +42,26 @@ void LogPart::close(const recording::LogReader& log) {
   const std::uint64_t sweeps_lost = undecodable("points");
   const std::uint64_t imu_lost = undecodable("imu");
   const std::uint64_t fixes_lost = undecodable("fix");
-  counts_.write({{"points.in_log", sweeps_ + sweeps_lost},
-                 {"points.undecodable", sweeps_lost},
-                 {"points.published", sweeps_},
-                 {"imu.in_log", imu_ + imu_lost},
-                 {"imu.undecodable", imu_lost},
-                 {"imu.published", imu_},
-                 {"fix.in_log", fixes_fed_ + fixes_withheld_ + fixes_lost},
-                 {"fix.undecodable", fixes_lost},
-                 {"fix.withheld", fixes_withheld_},
-                 {"fix.published", fixes_fed_}});
+  std::vector<NamedCount> counts{{"points.in_log", sweeps_ + sweeps_lost},
+                                 {"points.undecodable", sweeps_lost},
+                                 {"points.published", sweeps_},
+                                 {"imu.in_log", imu_ + imu_lost},
+                                 {"imu.undecodable", imu_lost},
+                                 {"imu.published", imu_},
+                                 {"fix.in_log", fixes_fed_ + fixes_withheld_ + fixes_lost},
+                                 {"fix.undecodable", fixes_lost},
+                                 {"fix.withheld", fixes_withheld_},
+                                 {"fix.published", fixes_fed_}};
+  const auto add_optional = [&](const std::string& input, std::uint64_t fed) {
+    if (const std::uint64_t lost = undecodable(input); fed + lost > 0) {
+      counts.push_back({input + ".in_log", fed + lost});
+      counts.push_back({input + ".undecodable", lost});
+      counts.push_back({input + ".published", fed});
+    }
+  };
+  add_optional("twist", twists_);
+  add_optional("yaw", yaws_);
+  counts_.write(counts);
 }
 
 void LogPart::keep_truth(const recording::LogReader& log) const {

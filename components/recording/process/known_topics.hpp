@@ -15,10 +15,11 @@ struct KnownTopic {
   std::string name;      ///< without a leading slash
   std::string ros_type;  ///< e.g. "sensor_msgs/msg/Imu"
   bus::Qos qos;
-  bool from_sensor{false};  ///< one of the three inputs
+  bool from_sensor{false};  ///< one of the inputs
 };
 
-/// The three sensor topics under the names that `robot` gives them, and all others.
+/// The sensor topics under the names that `robot` gives them (twists and yaws where it has any),
+/// and all others.
 std::vector<KnownTopic> known_topics(const RobotConfig& robot);
 
 }  // namespace trigpoint::recording

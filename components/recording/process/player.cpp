@@ -52,6 +52,20 @@ class Player {
                          pace_.on_fusion_status(bus::from_message(m));
                        }) {}
 
+  /// Twists and yaws are published where the robot has topics for them and the log has messages;
+  /// a yaw that is the IMU's own orientation is in the IMU's message already.
+  void advertise_aiding() {
+    const RobotConfig& robot = options_.robot;
+    if (!robot.twist_topic.empty() && robot.twist_message == "Odometry") {
+      odometry_twists_.emplace(participant_, topics::twist_odometry.renamed(robot.twist_topic));
+    } else if (!robot.twist_topic.empty()) {
+      twists_.emplace(participant_, topics::twist.renamed(robot.twist_topic));
+    }
+    if (!robot.yaw_topic.empty() && robot.yaw_topic != robot.imu_topic) {
+      yaws_.emplace(participant_, topics::yaw.renamed(robot.yaw_topic));
+    }
+  }
+
   /// The mapper, the filter and the gate must listen and be heard before the first message.
   void wait_for_peers() {
     const auto deadline = WallClock::now() + options_.wait_for_peers;
@@ -151,6 +165,20 @@ class Player {
     }
   }
 
+  void send(const TwistMeasurement& twist) {
+    if (odometry_twists_) {
+      odometry_twists_->publish(bus::to_odometry_message(twist));
+    } else if (twists_) {
+      twists_->publish(bus::to_message(twist));
+    }
+  }
+
+  void send(const YawMeasurement& yaw) {
+    if (yaws_) {
+      yaws_->publish(bus::to_message(yaw));
+    }
+  }
+
   void send(const GnssFix& fix) {
     fixes_.publish(bus::to_message(fix));
     ++result.fixes;
@@ -213,6 +241,9 @@ class Player {
   bus::Publisher<sensor_msgs::msg::PointCloud2> points_;
   bus::Publisher<sensor_msgs::msg::Imu> imu_;
   bus::Publisher<sensor_msgs::msg::NavSatFix> fixes_;
+  std::optional<bus::Publisher<geometry_msgs::msg::TwistWithCovarianceStamped>> twists_;
+  std::optional<bus::Publisher<nav_msgs::msg::Odometry>> odometry_twists_;
+  std::optional<bus::Publisher<sensor_msgs::msg::Imu>> yaws_;
   bus::Publisher<rosgraph_msgs::msg::Clock> clock_;
   bus::Subscription<trigpoint_msgs::msg::LioStatus> lio_status_;
   bus::Subscription<trigpoint_msgs::msg::GpsStatus> gps_status_;
@@ -224,6 +255,7 @@ class Player {
 PlayResult play(LogReader& log, const PlayOptions& options) {
   Player player(options);
   player.tell(fault_events(log.summary()));
+  player.advertise_aiding();
   player.wait_for_peers();
   try {
     while (!player.stop_requested()) {

@@ -42,9 +42,10 @@ struct PlayResult {
   std::string log_error;  ///< not empty when the log broke off
 };
 
-/// Publishes points, imu/data, gps/fix (under the names in `robot`) and clock. Throws
-/// std::runtime_error when the bus cannot be joined, when nobody listens (unless that is allowed),
-/// or when two mappers or two gates do, whose results would be mixed.
+/// Publishes points, imu/data, gps/fix (under the names in `robot`), twists and yaws where `robot`
+/// has topics for them, and clock. Throws std::runtime_error when the bus cannot be joined, when
+/// nobody listens (unless that is allowed), or when two mappers or two gates do, whose results
+/// would be mixed.
 PlayResult play(LogReader& log, const PlayOptions& options);
 
 }  // namespace trigpoint::recording

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <utility>
 
 namespace trigpoint::recording {
 
@@ -16,12 +17,15 @@ class BagReader : public LogReader {
  public:
   BagReader(std::unique_ptr<BagSource> source, TopicChoice topics)
       : source_(std::move(source)), topics_(std::move(topics)) {
-    source_->select({topics_.points, topics_.imu, topics_.fix});
+    source_->select({topics_.points, topics_.imu, topics_.fix, topics_.twist, topics_.yaw});
   }
 
   const LogSummary& summary() const override { return source_->summary(); }
 
   std::optional<LogEntry> next() override {
+    if (second_) {
+      return std::exchange(second_, std::nullopt);
+    }
     while (const auto raw = source_->next()) {
       now_ns_ = raw->receive_ns;
       if (auto entry = entry_of(*raw)) {
@@ -56,21 +60,60 @@ class BagReader : public LogReader {
  private:
   std::optional<LogEntry> entry_of(const RawMessage& raw) {
     if (raw.topic == topics_.points) {
-      return decoded<PointCloudMessage>(raw, "points", "sensor_msgs/msg/PointCloud2");
+      return entry<PointCloudMessage>(raw, "points", "sensor_msgs/msg/PointCloud2");
     }
     if (raw.topic == topics_.imu) {
-      return decoded<ImuSample>(raw, "imu", "sensor_msgs/msg/Imu");
+      if (raw.topic == topics_.yaw) {
+        second_ = yaw_of(raw);
+      }
+      return entry<ImuSample>(raw, "imu", "sensor_msgs/msg/Imu");
     }
-    return decoded<GnssFix>(raw, "fix", "sensor_msgs/msg/NavSatFix");
+    if (raw.topic == topics_.twist) {
+      return topics_.twist_is_odometry
+                 ? twist_of(raw, decoded<Odometry>(raw, "twist", "nav_msgs/msg/Odometry"))
+                 : entry<TwistMeasurement>(
+                       raw, "twist", "geometry_msgs/msg/TwistWithCovarianceStamped");
+    }
+    if (raw.topic == topics_.yaw) {
+      return entry<YawMeasurement>(raw, "yaw", "sensor_msgs/msg/Imu");
+    }
+    return entry<GnssFix>(raw, "fix", "sensor_msgs/msg/NavSatFix");
+  }
+
+  /// Of an IMU that is also the heading; a damaged message is counted as the IMU's.
+  std::optional<LogEntry> yaw_of(const RawMessage& raw) const {
+    YawMeasurement yaw;
+    return source_->decode(raw, yaw) ? std::optional(LogEntry{raw.receive_ns, std::move(yaw)})
+                                     : std::nullopt;
+  }
+
+  /// What a twist topic of this type means.
+  static std::optional<LogEntry> twist_of(const RawMessage& raw,
+                                          const std::optional<Odometry>& odometry) {
+    if (!odometry) {
+      return std::nullopt;
+    }
+    TwistMeasurement twist;
+    twist.stamp_ns = odometry->stamp_ns;
+    twist.frame_id = odometry->child_frame_id;
+    twist.linear_mps = odometry->linear_mps;
+    twist.covariance_m2ps2 = odometry->twist_covariance.topLeftCorner<3, 3>();
+    return LogEntry{raw.receive_ns, std::move(twist)};
+  }
+
+  template <class Message>
+  std::optional<LogEntry> entry(const RawMessage& raw, const char* input, const char* type) {
+    auto message = decoded<Message>(raw, input, type);
+    return message ? std::optional(LogEntry{raw.receive_ns, std::move(*message)}) : std::nullopt;
   }
 
   /// nullopt for a message that is damaged; it is counted, and the log goes on.
   template <class Message>
-  std::optional<LogEntry> decoded(const RawMessage& raw, const char* input, const char* type) {
+  std::optional<Message> decoded(const RawMessage& raw, const char* input, const char* type) {
     const std::uint64_t number = ++numbers_[raw.topic];
     Message message;
     if (source_->decode(raw, message)) {
-      return LogEntry{raw.receive_ns, std::move(message)};
+      return message;
     }
     skipped_.add({input, raw.topic, std::string("not a ") + type},
                  number,
@@ -83,6 +126,7 @@ class BagReader : public LogReader {
   std::unique_ptr<BagSource> source_;
   TopicChoice topics_;
   SkippedMessages skipped_;
+  std::optional<LogEntry> second_;                ///< of the same message
   std::map<std::string, std::uint64_t> numbers_;  ///< messages so far, by topic
   Nanoseconds now_ns_{0};
 };

@@ -3,6 +3,7 @@
 // What ROS 1 bags and rosbag2 have in common: serialised messages of named topics, in order.
 #pragma once
 
+#include "trigpoint/base/messages.hpp"
 #include "trigpoint/recording/log.hpp"
 
 #include "topic_choice.hpp"
@@ -36,6 +37,9 @@ class BagSource {
   virtual bool decode(const RawMessage& raw, ImuSample& imu) const = 0;
   virtual bool decode(const RawMessage& raw, GnssFix& fix) const = 0;
   virtual bool decode(const RawMessage& raw, PointCloudMessage& cloud) const = 0;
+  virtual bool decode(const RawMessage& raw, TwistMeasurement& twist) const = 0;
+  virtual bool decode(const RawMessage& raw, Odometry& odometry) const = 0;
+  virtual bool decode(const RawMessage& raw, YawMeasurement& yaw) const = 0;
 };
 
 /// A reader over `source` with the topics that `robot` names. Throws LogError as choose_topics

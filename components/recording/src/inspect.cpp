@@ -139,7 +139,7 @@ class Inspector {
     judge_points();
     judge_fixes();
     Inspection inspection;
-    for (const Stream* stream : {&points_, &imu_, &fixes_}) {
+    for (const Stream* stream : {&points_, &imu_, &fixes_, &twists_, &yaws_}) {
       const auto statistics = stream->statistics();
       if (statistics.messages > 0) {
         judge_stamps(statistics);
@@ -164,6 +164,14 @@ class Inspector {
   void add(const PointCloudMessage& cloud, Nanoseconds receive_ns) {
     points_.add(cloud.stamp_ns, receive_ns, cloud.frame_id);
     points_content_.add(cloud);
+  }
+
+  void add(const TwistMeasurement& twist, Nanoseconds receive_ns) {
+    twists_.add(twist.stamp_ns, receive_ns, twist.frame_id);
+  }
+
+  void add(const YawMeasurement& yaw, Nanoseconds receive_ns) {
+    yaws_.add(yaw.stamp_ns, receive_ns, yaw.frame_id);
   }
 
   void say(Severity severity, const char* code, std::string text) {
@@ -310,6 +318,8 @@ class Inspector {
   Stream points_{"points"};
   Stream imu_{"imu"};
   Stream fixes_{"fix"};
+  Stream twists_{"twist"};
+  Stream yaws_{"yaw"};
   ImuContent imu_content_;
   FixContent fix_content_;
   PointsContent points_content_;

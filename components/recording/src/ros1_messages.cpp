@@ -132,6 +132,47 @@ PointCloudMessage read_cloud(Bytes& bytes) {
   return cloud;
 }
 
+Matrix6d matrix6(const Eigen::Matrix<double, 36, 1>& row_major) {
+  return Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(row_major.data());
+}
+
+TwistMeasurement read_twist(Bytes& bytes) {
+  TwistMeasurement twist;
+  read_header(bytes, twist);
+  twist.linear_mps = bytes.numbers<3>();
+  bytes.numbers<3>();
+  twist.covariance_m2ps2 = matrix6(bytes.numbers<36>()).topLeftCorner<3, 3>();
+  return twist;
+}
+
+Odometry read_odometry(Bytes& bytes) {
+  Odometry odometry;
+  read_header(bytes, odometry);
+  odometry.child_frame_id = bytes.text();
+  odometry.T_frame_child.p = bytes.numbers<3>();
+  const auto xyzw = bytes.numbers<4>();
+  odometry.T_frame_child.q = Eigen::Quaterniond(xyzw[3], xyzw[0], xyzw[1], xyzw[2]);
+  odometry.pose_covariance = matrix6(bytes.numbers<36>());
+  odometry.linear_mps = bytes.numbers<3>();
+  odometry.angular_radps = bytes.numbers<3>();
+  odometry.twist_covariance = matrix6(bytes.numbers<36>());
+  return odometry;
+}
+
+/// The orientation as it came: the filter judges its length.
+YawMeasurement read_yaw(Bytes& bytes) {
+  YawMeasurement yaw;
+  read_header(bytes, yaw);
+  const auto xyzw = bytes.numbers<4>();
+  const auto covariance = bytes.numbers<9>();
+  bytes.numbers<3 + 9 + 3 + 9>();
+  if (covariance[0] != -1.0 && !xyzw.isZero(0.0)) {
+    yaw.q_world_base = Eigen::Quaterniond(xyzw[3], xyzw[0], xyzw[1], xyzw[2]);
+  }
+  yaw.variance_rad2 = covariance[8];
+  return yaw;
+}
+
 template <class Message>
 bool decode(std::span<const std::uint8_t> bytes, Message& message, Message (*read)(Bytes&)) {
   try {
@@ -155,6 +196,18 @@ bool decode_ros1(std::span<const std::uint8_t> bytes, GnssFix& fix) {
 
 bool decode_ros1(std::span<const std::uint8_t> bytes, PointCloudMessage& cloud) {
   return decode(bytes, cloud, read_cloud);
+}
+
+bool decode_ros1(std::span<const std::uint8_t> bytes, TwistMeasurement& twist) {
+  return decode(bytes, twist, read_twist);
+}
+
+bool decode_ros1(std::span<const std::uint8_t> bytes, Odometry& odometry) {
+  return decode(bytes, odometry, read_odometry);
+}
+
+bool decode_ros1(std::span<const std::uint8_t> bytes, YawMeasurement& yaw) {
+  return decode(bytes, yaw, read_yaw);
 }
 
 }  // namespace trigpoint::recording

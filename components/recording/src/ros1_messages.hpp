@@ -3,6 +3,7 @@
 #pragma once
 
 #include "trigpoint/base/measurements.hpp"
+#include "trigpoint/base/messages.hpp"
 
 #include <cstdint>
 #include <span>
@@ -13,5 +14,8 @@ namespace trigpoint::recording {
 bool decode_ros1(std::span<const std::uint8_t> bytes, ImuSample& imu);
 bool decode_ros1(std::span<const std::uint8_t> bytes, GnssFix& fix);
 bool decode_ros1(std::span<const std::uint8_t> bytes, PointCloudMessage& cloud);
+bool decode_ros1(std::span<const std::uint8_t> bytes, TwistMeasurement& twist);
+bool decode_ros1(std::span<const std::uint8_t> bytes, Odometry& odometry);
+bool decode_ros1(std::span<const std::uint8_t> bytes, YawMeasurement& yaw);
 
 }  // namespace trigpoint::recording

@@ -197,6 +197,18 @@ class SalvagedBag : public BagSource {
     return decode_ros1(raw.bytes, cloud);
   }
 
+  bool decode(const RawMessage& raw, TwistMeasurement& twist) const override {
+    return decode_ros1(raw.bytes, twist);
+  }
+
+  bool decode(const RawMessage& raw, Odometry& odometry) const override {
+    return decode_ros1(raw.bytes, odometry);
+  }
+
+  bool decode(const RawMessage& raw, YawMeasurement& yaw) const override {
+    return decode_ros1(raw.bytes, yaw);
+  }
+
  private:
   std::optional<std::vector<std::uint8_t>> read_at(std::uint64_t begin, std::uint64_t size) {
     if (begin + size > size_) {

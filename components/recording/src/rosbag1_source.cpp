@@ -70,6 +70,18 @@ class IndexedBag : public BagSource {
     return decode_ros1(raw.bytes, cloud);
   }
 
+  bool decode(const RawMessage& raw, TwistMeasurement& twist) const override {
+    return decode_ros1(raw.bytes, twist);
+  }
+
+  bool decode(const RawMessage& raw, Odometry& odometry) const override {
+    return decode_ros1(raw.bytes, odometry);
+  }
+
+  bool decode(const RawMessage& raw, YawMeasurement& yaw) const override {
+    return decode_ros1(raw.bytes, yaw);
+  }
+
  private:
   void summarize(const fs::path& file) {
     summary_.path = file.string();

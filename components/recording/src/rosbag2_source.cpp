@@ -275,6 +275,18 @@ class Rosbag2Source : public BagSource {
     return bus::decode_cdr(raw.bytes, cloud);
   }
 
+  bool decode(const RawMessage& raw, TwistMeasurement& twist) const override {
+    return bus::decode_cdr(raw.bytes, twist);
+  }
+
+  bool decode(const RawMessage& raw, Odometry& odometry) const override {
+    return bus::decode_cdr(raw.bytes, odometry);
+  }
+
+  bool decode(const RawMessage& raw, YawMeasurement& yaw) const override {
+    return bus::decode_cdr(raw.bytes, yaw);
+  }
+
  private:
   void summarize(const fs::path& path) {
     summary_.path = path.string();

@@ -322,6 +322,8 @@ void Rosbag2Writer::write(const std::string& topic, Nanoseconds receive_ns, cons
 template void Rosbag2Writer::write(const std::string&, Nanoseconds, const ImuSample&);
 template void Rosbag2Writer::write(const std::string&, Nanoseconds, const GnssFix&);
 template void Rosbag2Writer::write(const std::string&, Nanoseconds, const PointCloudMessage&);
+template void Rosbag2Writer::write(const std::string&, Nanoseconds, const TwistMeasurement&);
+template void Rosbag2Writer::write(const std::string&, Nanoseconds, const YawMeasurement&);
 template void Rosbag2Writer::write(const std::string&, Nanoseconds, const Odometry&);
 template void Rosbag2Writer::write(const std::string&, Nanoseconds, const Datum&);
 template void Rosbag2Writer::write(const std::string&, Nanoseconds, const GpsStatus&);

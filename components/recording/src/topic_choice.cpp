@@ -39,7 +39,7 @@ std::string list_of(const std::vector<TopicSummary>& topics) {
   return text;
 }
 
-/// One of the three inputs: its name by configuration and its type.
+/// One of the inputs: its name by configuration and its type.
 struct Wanted {
   const char* key;
   std::string topic;
@@ -117,6 +117,19 @@ TopicChoice choose_topics(const LogSummary& log,
                         options.require_points});
   choice.imu =
       find(log, {"robot.imu_topic", robot.imu_topic, "sensor_msgs/msg/Imu", options.require_imu});
+  choice.twist_is_odometry = robot.twist_message == "Odometry";
+  if (!robot.twist_topic.empty()) {
+    choice.twist = find(log,
+                        {"robot.twist_topic",
+                         robot.twist_topic,
+                         choice.twist_is_odometry ? "nav_msgs/msg/Odometry"
+                                                  : "geometry_msgs/msg/TwistWithCovarianceStamped",
+                         options.require_aiding});
+  }
+  if (!robot.yaw_topic.empty()) {
+    choice.yaw = find(
+        log, {"robot.yaw_topic", robot.yaw_topic, "sensor_msgs/msg/Imu", options.require_aiding});
+  }
   choice.fix = find(
       log, {"robot.fix_topic", robot.fix_topic, "sensor_msgs/msg/NavSatFix", options.require_fix});
   return choice;

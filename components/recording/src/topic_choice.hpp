@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
-// Which of a bag's topics are the points, the IMU and the fixes.
+// Which of a bag's topics are the points, the IMU, the fixes, the twists and the yaws.
 #pragma once
 
 #include "trigpoint/recording/log.hpp"
@@ -9,11 +9,15 @@
 
 namespace trigpoint::recording {
 
-/// Names as the log spells them; empty when the log lacks a topic that is not required.
+/// Names as the log spells them; empty when the log lacks a topic that is not required, or the
+/// robot has none.
 struct TopicChoice {
   std::string points;
   std::string imu;
   std::string fix;
+  std::string twist;
+  bool twist_is_odometry{false};
+  std::string yaw;  ///< may be the IMU's
 };
 
 /// Finds the topics that `robot` names, with or without a leading slash. Throws LogError when the

@@ -34,6 +34,7 @@ std::string robot_overlay(RobotConfig robot) {
          });
 }
 
+/// A simulated robot has neither twists nor yaws.
 const std::string& topic_of(const recording::Measurement& measurement, const RobotConfig& robot) {
   if (std::holds_alternative<ImuSample>(measurement)) {
     return robot.imu_topic;

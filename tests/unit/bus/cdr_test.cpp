@@ -84,6 +84,8 @@ TEST(Cdr, names_the_types_as_ros_does) {
   EXPECT_STREQ(ros_type_name<ImuSample>(), "sensor_msgs/msg/Imu");
   EXPECT_STREQ(ros_type_name<GnssFix>(), "sensor_msgs/msg/NavSatFix");
   EXPECT_STREQ(ros_type_name<PointCloudMessage>(), "sensor_msgs/msg/PointCloud2");
+  EXPECT_STREQ(ros_type_name<TwistMeasurement>(), "geometry_msgs/msg/TwistWithCovarianceStamped");
+  EXPECT_STREQ(ros_type_name<YawMeasurement>(), "sensor_msgs/msg/Imu");
   EXPECT_STREQ(ros_type_name<Odometry>(), "nav_msgs/msg/Odometry");
   EXPECT_STREQ(ros_type_name<Datum>(), "sensor_msgs/msg/NavSatFix");
   EXPECT_STREQ(ros_type_name<GpsStatus>(), "trigpoint_msgs/msg/GpsStatus");
@@ -99,6 +101,8 @@ struct Samples {
   ImuSample imu = samples::imu();
   GnssFix fix = samples::fix();
   PointCloudMessage cloud = samples::cloud();
+  TwistMeasurement twist = samples::twist();
+  YawMeasurement yaw = samples::yaw();
   Odometry odometry = samples::odometry();
   Datum datum = samples::datum();
   GpsStatus gps = samples::gps_status();
@@ -111,6 +115,10 @@ struct Samples {
   const GnssFix& get(const GnssFix*) const { return fix; }
 
   const PointCloudMessage& get(const PointCloudMessage*) const { return cloud; }
+
+  const TwistMeasurement& get(const TwistMeasurement*) const { return twist; }
+
+  const YawMeasurement& get(const YawMeasurement*) const { return yaw; }
 
   const Odometry& get(const Odometry*) const { return odometry; }
 
@@ -133,6 +141,8 @@ Plain sample() {
 using Plains = ::testing::Types<ImuSample,
                                 GnssFix,
                                 PointCloudMessage,
+                                TwistMeasurement,
+                                YawMeasurement,
                                 Odometry,
                                 Datum,
                                 GpsStatus,

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
 namespace trigpoint::bus {
@@ -71,6 +72,81 @@ TEST(FixMessage, of_an_unknown_covariance_type_has_an_unknown_covariance) {
   auto message = to_message(samples::fix());
   message.position_covariance_type(4);
   EXPECT_EQ(from_message(message).covariance_type, CovarianceType::kUnknown);
+}
+
+TEST(TwistMessage, is_the_linear_part_alone) {
+  geometry_msgs::msg::TwistWithCovarianceStamped message;
+  message.header().stamp().sec(7);
+  message.header().stamp().nanosec(9);
+  message.header().frame_id("base_link");
+  message.twist().twist().linear().x(-1.0);
+  message.twist().twist().linear().y(2.0);
+  message.twist().twist().linear().z(3.0);
+  message.twist().twist().angular().z(4.0);
+  for (std::size_t i = 0; i < 36; ++i) {
+    message.twist().covariance()[i] = static_cast<double>(i);
+  }
+  const TwistMeasurement twist = twist_from_message(message);
+  EXPECT_EQ(twist.stamp_ns, 7'000'000'009);
+  EXPECT_EQ(twist.frame_id, "base_link");
+  EXPECT_EQ(twist.linear_mps, Eigen::Vector3d(-1.0, 2.0, 3.0));
+  Eigen::Matrix3d expected;  // six to a row, of which the first three
+  expected << 0, 1, 2, 6, 7, 8, 12, 13, 14;
+  EXPECT_EQ(twist.covariance_m2ps2, expected);
+}
+
+TEST(TwistMessage, of_an_odometry_is_in_its_child_frame) {
+  const Odometry odometry = samples::odometry();
+  const TwistMeasurement twist = twist_from_message(to_message(odometry));
+  EXPECT_EQ(twist.stamp_ns, odometry.stamp_ns);
+  EXPECT_EQ(twist.frame_id, odometry.child_frame_id);
+  EXPECT_EQ(twist.linear_mps, odometry.linear_mps);
+  EXPECT_EQ(twist.covariance_m2ps2, (odometry.twist_covariance.topLeftCorner<3, 3>()));
+}
+
+TEST(TwistMessage, as_an_odometry_comes_back_and_claims_no_pose) {
+  const auto message = to_odometry_message(samples::twist());
+  samples::expect_equal(twist_from_message(message), samples::twist());
+  EXPECT_EQ(message.pose().covariance()[0], kUnknownVariance);
+  EXPECT_EQ(message.pose().covariance()[35], kUnknownVariance);
+  EXPECT_EQ(message.twist().covariance()[35], kUnknownVariance);
+}
+
+TEST(TwistMessage, is_not_judged) {
+  auto message = to_message(samples::twist());
+  message.twist().twist().linear().x(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_TRUE(std::isnan(twist_from_message(message).linear_mps.x()));
+}
+
+TEST(YawMessage, is_an_imu_whose_orientation_comes_as_it_is) {
+  auto message = to_message(samples::imu());
+  message.orientation().w(0.9);  // not of unit length any more
+  message.orientation_covariance({1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 0.04});
+  const YawMeasurement yaw = yaw_from_message(message);
+  EXPECT_EQ(yaw.stamp_ns, samples::imu().stamp_ns);
+  EXPECT_EQ(yaw.frame_id, samples::imu().frame_id);
+  ASSERT_TRUE(yaw.q_world_base);
+  EXPECT_EQ(yaw.q_world_base->coeffs(), Eigen::Vector4d(-0.5, 0.5, -0.5, 0.9));
+  EXPECT_EQ(yaw.variance_rad2, 0.04);
+}
+
+TEST(YawMessage, without_an_orientation_has_none) {
+  auto without = to_message(samples::yaw());
+  without.orientation_covariance()[0] = -1.0;
+  EXPECT_FALSE(yaw_from_message(without).q_world_base);
+  auto zero = to_message(samples::yaw());
+  zero.orientation(geometry_msgs::msg::Quaternion());
+  zero.orientation().w(0.0);
+  EXPECT_FALSE(yaw_from_message(zero).q_world_base);
+  YawMeasurement none = samples::yaw();
+  none.q_world_base.reset();
+  EXPECT_FALSE(yaw_from_message(to_message(none)).q_world_base);
+}
+
+TEST(YawMessage, says_that_it_measures_neither_rate_nor_acceleration) {
+  const auto message = to_message(samples::yaw());
+  EXPECT_EQ(message.angular_velocity_covariance()[0], -1.0);
+  EXPECT_EQ(message.linear_acceleration_covariance()[0], -1.0);
 }
 
 TEST(OdometryMessage, has_position_before_rotation_row_by_row) {

@@ -47,6 +47,24 @@ inline GnssFix fix() {
   return fix;
 }
 
+inline TwistMeasurement twist() {
+  TwistMeasurement twist;
+  twist.stamp_ns = 1'700'000'001'500'000'003;
+  twist.frame_id = "rear_axle";
+  twist.linear_mps = {-1.5, 0.25, 0.125};
+  twist.covariance_m2ps2 = counting_matrix<3>(0.5);
+  return twist;
+}
+
+inline YawMeasurement yaw() {
+  YawMeasurement yaw;
+  yaw.stamp_ns = 1'700'000'002'500'000'004;
+  yaw.frame_id = "compass";
+  yaw.q_world_base = Eigen::Quaterniond(0.5, 0.25, -0.125, 0.75);  // of no unit length: as it came
+  yaw.variance_rad2 = 0.0625;
+  return yaw;
+}
+
 inline PointCloudMessage cloud() {
   PointCloudMessage cloud;
   cloud.stamp_ns = -1;  // also before 1970
@@ -176,6 +194,23 @@ inline void expect_equal(const GnssFix& a, const GnssFix& b) {
   EXPECT_EQ(a.altitude_m, b.altitude_m);
   EXPECT_EQ(a.covariance_enu_m2, b.covariance_enu_m2);
   EXPECT_EQ(a.covariance_type, b.covariance_type);
+}
+
+inline void expect_equal(const TwistMeasurement& a, const TwistMeasurement& b) {
+  EXPECT_EQ(a.stamp_ns, b.stamp_ns);
+  EXPECT_EQ(a.frame_id, b.frame_id);
+  EXPECT_EQ(a.linear_mps, b.linear_mps);
+  EXPECT_EQ(a.covariance_m2ps2, b.covariance_m2ps2);
+}
+
+inline void expect_equal(const YawMeasurement& a, const YawMeasurement& b) {
+  EXPECT_EQ(a.stamp_ns, b.stamp_ns);
+  EXPECT_EQ(a.frame_id, b.frame_id);
+  ASSERT_EQ(a.q_world_base.has_value(), b.q_world_base.has_value());
+  if (a.q_world_base) {
+    EXPECT_EQ(a.q_world_base->coeffs(), b.q_world_base->coeffs());
+  }
+  EXPECT_EQ(a.variance_rad2, b.variance_rad2);
 }
 
 inline void expect_equal(const PointCloudMessage& a, const PointCloudMessage& b) {

@@ -121,6 +121,16 @@ TEST(Report, scores_the_antenna_against_withheld_fixes_with_the_lever_arm) {
   EXPECT_NEAR(std::stod(without[2]), std::hypot(0.5, 0.2, 1.5), 0.04);
 }
 
+TEST(Report, scores_against_fixes_on_the_ellipsoid_when_they_came_above_the_sea) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  write_all(folder.file("config.yaml"),
+            "robot:\n  antenna_position_base_m: [-0.5, 0.2, 1.5]\n  geoid_undulation_m: 40.0\n");
+  const auto text = write_report(folder.path(), kNoPictures).text;
+  const auto fused = row(text, "Against withheld fixes", {"fused.tum", "none"});
+  EXPECT_NEAR(std::stod(fused[2]), 40.0, 0.01) << "of fixes that were above the ellipsoid already";
+}
+
 TEST(Report, says_that_scoring_on_the_fixes_that_were_used_is_circular) {
   const ScratchFolder folder;
   make_session(folder.path(), false);

@@ -137,6 +137,48 @@ TEST(Lockstep, counts_a_late_fix_from_its_arrival_with_its_own_stamp) {
   EXPECT_GT(judged, fixes / 2);
 }
 
+// Wheels and heading are the filter's alone.
+TEST(Lockstep, feeds_twists_and_headings_to_the_filter) {
+  Lockstep cores(stored_drive().configs);
+  std::size_t twists = 0;
+  std::size_t yaws = 0;
+  for (const recording::LogEntry& entry : stored_drive().entries) {
+    cores.step(entry);
+    if (holds<GnssFix>(entry)) {
+      TwistMeasurement twist;
+      twist.stamp_ns = entry.receive_ns;
+      cores.step({entry.receive_ns, twist});  // not a number
+      YawMeasurement yaw;
+      yaw.stamp_ns = entry.receive_ns;
+      cores.step({entry.receive_ns, yaw});  // no orientation
+      ++twists;
+      ++yaws;
+    }
+  }
+  const auto rejections = cores.gps_status().rejections;
+  const auto count_of = [&](const std::string& name) {
+    const auto found = std::find_if(rejections.begin(), rejections.end(), [&](const auto& count) {
+      return count.name == name;
+    });
+    return found == rejections.end() ? std::uint64_t{0} : found->count;
+  };
+  EXPECT_GT(twists, 10U);
+  EXPECT_EQ(count_of("twist_not_finite"), twists);
+  EXPECT_EQ(count_of("yaw_without_orientation"), yaws);
+}
+
+TEST(Lockstep, is_not_changed_by_twists_and_headings_that_are_refused) {
+  Entries with_bad_ones;
+  for (const recording::LogEntry& entry : stored_drive().entries) {
+    with_bad_ones.push_back(entry);
+    if (holds<GnssFix>(entry)) {
+      with_bad_ones.push_back({entry.receive_ns, TwistMeasurement{}});
+      with_bad_ones.push_back({entry.receive_ns, YawMeasurement{}});
+    }
+  }
+  EXPECT_TRUE(run(stored_drive().entries) == run(with_bad_ones));
+}
+
 TEST(Lockstep, says_nothing_when_nothing_was_fed) {
   Lockstep cores(stored_drive().configs);
   const Step step = cores.finish();

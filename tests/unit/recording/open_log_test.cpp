@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 
 namespace trigpoint::recording {
@@ -82,6 +83,115 @@ TEST_F(OpenLog, refuses_a_topic_of_another_type) {
               AllOf(HasSubstr("is of type sensor_msgs/msg/Imu"),
                     HasSubstr("expected sensor_msgs/msg/PointCloud2"),
                     HasSubstr("'/points_raw'")));
+}
+
+// ---- wheels and heading -------------------------------------------------------------------------
+
+class OpenLogWithAiding : public OpenLog {
+ protected:
+  /// One second with wheels at 50 Hz, also as an Odometry, and a heading at 5 Hz.
+  std::string with_aiding() {
+    const auto path = (folder_ / "aided").string();
+    Rosbag2Writer writer(path);
+    for (int i = 0; i < 100; ++i) {
+      writer.write("imu/data", sample_imu(i).stamp_ns, sample_imu(i));
+      if (i % 2 == 0) {
+        writer.write("wheels", sample_twist(i / 2).stamp_ns, sample_twist(i / 2));
+        writer.write("odom", sample_twist(i / 2).stamp_ns, odometry(sample_twist(i / 2)));
+      }
+      if (i % 20 == 0) {
+        writer.write("compass", sample_yaw(i / 20).stamp_ns, sample_yaw(i / 20));
+      }
+    }
+    return path;
+  }
+
+  static Odometry odometry(const TwistMeasurement& twist) {
+    Odometry odometry;
+    odometry.stamp_ns = twist.stamp_ns;
+    odometry.frame_id = "odom";
+    odometry.child_frame_id = twist.frame_id;
+    odometry.T_frame_child.p = {100.0, 200.0, 300.0};
+    odometry.linear_mps = twist.linear_mps;
+    odometry.angular_radps = {7.0, 8.0, 9.0};
+    odometry.twist_covariance.topLeftCorner<3, 3>() = twist.covariance_m2ps2;
+    return odometry;
+  }
+
+  static LogOptions imu_alone() {
+    LogOptions options;
+    options.require_points = options.require_fix = false;
+    return options;
+  }
+
+  std::vector<LogEntry> entries(const RobotConfig& robot) {
+    return read_all(*open_log(with_aiding(), robot, imu_alone()));
+  }
+};
+
+TEST_F(OpenLogWithAiding, leaves_them_alone_when_the_robot_has_no_topics_for_them) {
+  EXPECT_EQ(100U, entries(RobotConfig{}).size());
+}
+
+TEST_F(OpenLogWithAiding, delivers_twists_in_order_with_the_rest) {
+  RobotConfig robot;
+  robot.twist_topic = "/wheels";
+  const auto all = entries(robot);
+  const auto twists = only<TwistMeasurement>(all);
+  ASSERT_EQ(50U, twists.size());
+  EXPECT_EQ(100U, only<ImuSample>(all).size());
+  for (int i = 0; i < 50; ++i) {
+    expect_equal(sample_twist(i), twists[static_cast<std::size_t>(i)]);
+  }
+  EXPECT_TRUE(std::is_sorted(all.begin(), all.end(), [](const LogEntry& a, const LogEntry& b) {
+    return a.receive_ns < b.receive_ns;
+  }));
+}
+
+TEST_F(OpenLogWithAiding, takes_the_twist_of_an_odometry) {
+  RobotConfig robot;
+  robot.twist_topic = "odom";
+  robot.twist_message = "Odometry";
+  const auto twists = only<TwistMeasurement>(entries(robot));
+  ASSERT_EQ(50U, twists.size());
+  expect_equal(sample_twist(7), twists[7]);
+}
+
+TEST_F(OpenLogWithAiding, delivers_headings) {
+  RobotConfig robot;
+  robot.yaw_topic = "compass";
+  const auto yaws = only<YawMeasurement>(entries(robot));
+  ASSERT_EQ(5U, yaws.size());
+  expect_equal(sample_yaw(3), yaws[3]);
+}
+
+TEST_F(OpenLogWithAiding, takes_an_imu_that_is_also_the_heading_for_both) {
+  RobotConfig robot;
+  robot.yaw_topic = "/imu/data";
+  const auto all = entries(robot);
+  const auto yaws = only<YawMeasurement>(all);
+  ASSERT_EQ(100U, yaws.size());
+  EXPECT_EQ(100U, only<ImuSample>(all).size());
+  EXPECT_EQ(sample_imu(42).stamp_ns, yaws[42].stamp_ns);
+  EXPECT_EQ(sample_imu(42).q_world_base->coeffs(), yaws[42].q_world_base->coeffs());
+}
+
+TEST_F(OpenLogWithAiding, refuses_a_log_without_a_topic_that_was_named_unless_told_otherwise) {
+  RobotConfig robot;
+  robot.twist_topic = "weels";
+  EXPECT_THAT(message_of<LogError>([&] { open_log(with_aiding(), robot, imu_alone()); }),
+              AllOf(HasSubstr("robot.twist_topic"), HasSubstr("did you mean '/wheels'?")));
+  LogOptions lenient = imu_alone();
+  lenient.require_aiding = false;
+  EXPECT_EQ(100U, read_all(*open_log((folder_ / "aided").string(), robot, lenient)).size());
+}
+
+TEST_F(OpenLogWithAiding, refuses_twists_of_the_other_type) {
+  RobotConfig robot;
+  robot.twist_topic = "odom";
+  EXPECT_THAT(message_of<LogError>([&] { open_log(with_aiding(), robot, imu_alone()); }),
+              AllOf(HasSubstr("is of type nav_msgs/msg/Odometry"),
+                    HasSubstr("expected geometry_msgs/msg/TwistWithCovarianceStamped")));
 }
 
 TEST_F(OpenLog, refuses_what_is_no_log) {

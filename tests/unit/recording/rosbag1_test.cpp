@@ -4,6 +4,8 @@
 
 #include "samples.hpp"
 #include "temporary_folder.hpp"
+#include <geometry_msgs/PoseWithCovariance.h>
+#include <geometry_msgs/TwistWithCovarianceStamped.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rosbag/bag.h>
@@ -12,6 +14,54 @@
 #include <sensor_msgs/PointCloud2.h>
 
 #include <fstream>
+
+// nav_msgs/Odometry, which has no Debian package of its own here, of ROS 1's own parts.
+struct RosOdometry {
+  std_msgs::Header header;
+  std::string child_frame_id;
+  geometry_msgs::PoseWithCovariance pose;
+  geometry_msgs::TwistWithCovariance twist;
+};
+
+namespace ros {
+namespace message_traits {
+template <>
+struct MD5Sum<RosOdometry> {
+  static const char* value() { return "cd5e73d190d741a2f92e81eda573aca7"; }
+
+  static const char* value(const RosOdometry&) { return value(); }
+};
+
+template <>
+struct DataType<RosOdometry> {
+  static const char* value() { return "nav_msgs/Odometry"; }
+
+  static const char* value(const RosOdometry&) { return value(); }
+};
+
+template <>
+struct Definition<RosOdometry> {
+  static const char* value() { return ""; }
+
+  static const char* value(const RosOdometry&) { return value(); }
+};
+}  // namespace message_traits
+
+namespace serialization {
+template <>
+struct Serializer<RosOdometry> {
+  template <typename Stream, typename Message>
+  static void allInOne(Stream& stream, Message message) {
+    stream.next(message.header);
+    stream.next(message.child_frame_id);
+    stream.next(message.pose);
+    stream.next(message.twist);
+  }
+
+  ROS_DECLARE_ALLINONE_SERIALIZER
+};
+}  // namespace serialization
+}  // namespace ros
 
 namespace trigpoint::recording {
 namespace {
@@ -40,6 +90,24 @@ sensor_msgs::Imu ros_imu(const ImuSample& imu) {
   message.linear_acceleration.x = imu.accel_mps2.x();
   message.linear_acceleration.y = imu.accel_mps2.y();
   message.linear_acceleration.z = imu.accel_mps2.z();
+  return message;
+}
+
+geometry_msgs::TwistWithCovariance ros_twist(const TwistMeasurement& twist) {
+  geometry_msgs::TwistWithCovariance message;
+  message.twist.linear.x = twist.linear_mps.x();
+  message.twist.linear.y = twist.linear_mps.y();
+  message.twist.linear.z = twist.linear_mps.z();
+  message.twist.angular.z = 77.0;
+  for (std::size_t i = 0; i < 36; ++i) {
+    message.covariance[i] = -1.0;
+  }
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      message.covariance[static_cast<std::size_t>(6 * row + column)] =
+          twist.covariance_m2ps2(row, column);
+    }
+  }
   return message;
 }
 
@@ -129,6 +197,53 @@ class Rosbag1 : public testing::TestWithParam<rosbag::CompressionType> {
  protected:
   TemporaryFolder folder_;
 };
+
+TEST_P(Rosbag1, decodes_twists_odometries_and_headings_that_ros_wrote) {
+  const fs::path file = folder_ / "aided.bag";
+  {
+    rosbag::Bag bag(file.string(), rosbag::bagmode::Write);
+    bag.setCompression(GetParam());
+    for (int i = 0; i < 10; ++i) {
+      const TwistMeasurement twist = sample_twist(i);
+      geometry_msgs::TwistWithCovarianceStamped wheels;
+      wheels.header.stamp = ros_time(twist.stamp_ns);
+      wheels.header.frame_id = twist.frame_id;
+      wheels.twist = ros_twist(twist);
+      bag.write("/wheels", ros_time(twist.stamp_ns), wheels);
+      RosOdometry odometry;
+      odometry.header = wheels.header;
+      odometry.header.frame_id = "odom";
+      odometry.child_frame_id = twist.frame_id;
+      odometry.pose.pose.position.x = 100.0;
+      odometry.pose.pose.orientation.w = 1.0;
+      odometry.twist = wheels.twist;
+      bag.write("/odom", ros_time(twist.stamp_ns), odometry);
+      const YawMeasurement yaw = sample_yaw(i);
+      ImuSample sample = sample_imu(i);
+      sample.q_world_base = yaw.q_world_base;
+      sensor_msgs::Imu compass = ros_imu(sample);
+      compass.header.stamp = ros_time(yaw.stamp_ns);
+      compass.header.frame_id = yaw.frame_id;
+      compass.orientation_covariance[8] = yaw.variance_rad2;
+      bag.write("/compass", ros_time(yaw.stamp_ns), compass);
+    }
+  }
+  LogOptions options;
+  options.require_points = options.require_imu = options.require_fix = false;
+  RobotConfig robot;
+  robot.yaw_topic = "compass";
+  for (const std::string message : {"TwistWithCovarianceStamped", "Odometry"}) {
+    robot.twist_message = message;
+    robot.twist_topic = message == "Odometry" ? "odom" : "wheels";
+    const auto entries = read_all(*open_log(file.string(), robot, options));
+    const auto twists = only<TwistMeasurement>(entries);
+    ASSERT_EQ(10U, twists.size()) << message;
+    expect_equal(sample_twist(3), twists[3]);
+    const auto yaws = only<YawMeasurement>(entries);
+    ASSERT_EQ(10U, yaws.size());
+    expect_equal(sample_yaw(4), yaws[4]);
+  }
+}
 
 TEST_P(Rosbag1, decodes_what_ros_wrote) {
   const auto log = open_log(record(folder_ / "drive.bag", GetParam()).string(), RobotConfig{});

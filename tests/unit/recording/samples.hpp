@@ -6,6 +6,8 @@
 #include "trigpoint/base/measurements.hpp"
 #include "trigpoint/recording/log.hpp"
 
+#include <gtest/gtest.h>
+
 #include <vector>
 
 namespace trigpoint::recording {
@@ -35,6 +37,39 @@ inline GnssFix sample_fix(int index) {
   fix.covariance_enu_m2 << 0.01, 0.002, 0.003, 0.002, 0.04, 0.005, 0.003, 0.005, 0.09;
   fix.covariance_type = CovarianceType::kKnown;
   return fix;
+}
+
+inline TwistMeasurement sample_twist(int index) {
+  TwistMeasurement twist;
+  twist.stamp_ns = kStart_ns + index * 20 * kMillisecond_ns;
+  twist.frame_id = "rear_axle";
+  twist.linear_mps = {1.5 + index, 0.25, -0.125};
+  twist.covariance_m2ps2 << 0.01, 0.002, 0.003, 0.004, 0.05, 0.006, 0.007, 0.008, 0.09;
+  return twist;
+}
+
+inline YawMeasurement sample_yaw(int index) {
+  YawMeasurement yaw;
+  yaw.stamp_ns = kStart_ns + index * 200 * kMillisecond_ns;
+  yaw.frame_id = "compass";
+  yaw.q_world_base = Eigen::Quaterniond(0.5, 0.5, -0.5, 0.75);  // of no unit length: as it came
+  yaw.variance_rad2 = 0.04 + index;
+  return yaw;
+}
+
+inline void expect_equal(const TwistMeasurement& expected, const TwistMeasurement& twist) {
+  EXPECT_EQ(expected.stamp_ns, twist.stamp_ns);
+  EXPECT_EQ(expected.frame_id, twist.frame_id);
+  EXPECT_EQ(expected.linear_mps, twist.linear_mps);
+  EXPECT_EQ(expected.covariance_m2ps2, twist.covariance_m2ps2);
+}
+
+inline void expect_equal(const YawMeasurement& expected, const YawMeasurement& yaw) {
+  EXPECT_EQ(expected.stamp_ns, yaw.stamp_ns);
+  EXPECT_EQ(expected.frame_id, yaw.frame_id);
+  ASSERT_TRUE(yaw.q_world_base);
+  EXPECT_EQ(expected.q_world_base->coeffs(), yaw.q_world_base->coeffs());
+  EXPECT_EQ(expected.variance_rad2, yaw.variance_rad2);
 }
 
 inline PointCloudMessage sample_cloud(int index, std::uint32_t points = 100) {

@@ -26,7 +26,8 @@ constexpr int kDatumFixes = 10;
 class Passthrough {
  public:
   Passthrough(const RobotConfig& robot, const bus::Config& config, bus::Loop& loop)
-      : participant_(config, "gps_passthrough"),
+      : geoid_undulation_m_(robot.geoid_undulation_m),
+        participant_(config, "gps_passthrough"),
         odometry_(participant_, topics::gps_odometry),
         status_(participant_, topics::gps_status),
         datum_(participant_, topics::datum),
@@ -61,7 +62,8 @@ class Passthrough {
 
   void take(const GnssFix& fix) {
     ++said_.fixes_received;
-    const geodesy::Geographic place{fix.latitude_deg, fix.longitude_deg, fix.altitude_m};
+    const geodesy::Geographic place{
+        fix.latitude_deg, fix.longitude_deg, fix.altitude_m + geoid_undulation_m_};
     if (fix.status < FixStatus::kFix || fix.stamp_ns <= newest_ns_ || geodesy::find_fault(place)) {
       said_.rejections = {{"unusable", ++unusable_}};
     } else {
@@ -141,6 +143,7 @@ class Passthrough {
     status_.publish(bus::to_message(said_));
   }
 
+  double geoid_undulation_m_;
   GpsStatus said_;
   std::optional<geodesy::LocalFrame> frame_;
   std::optional<geodesy::LocalFrame> candidate_;

@@ -48,6 +48,22 @@ struct GnssFix {
   CovarianceType covariance_type{CovarianceType::kUnknown};
 };
 
+/// Velocity of a point of the vehicle by wheels or another sensor: the linear part of a twist.
+struct TwistMeasurement {
+  Nanoseconds stamp_ns{0};
+  std::string frame_id;  ///< axes of the velocity
+  Eigen::Vector3d linear_mps{Eigen::Vector3d::Constant(kNaN)};
+  Eigen::Matrix3d covariance_m2ps2{Eigen::Matrix3d::Zero()};  ///< not positive: unknown
+};
+
+/// Heading by a magnetometer or two antennas: an attitude of which the yaw is used.
+struct YawMeasurement {
+  Nanoseconds stamp_ns{0};
+  std::string frame_id;
+  std::optional<Eigen::Quaterniond> q_world_base;  ///< world: east, north, up; as it came
+  double variance_rad2{0.0};                       ///< of yaw; not positive: unknown
+};
+
 /// One field of a point, as in sensor_msgs/PointField (datatype codes are ROS's: 1 int8, 2 uint8,
 /// 3 int16, 4 uint16, 5 int32, 6 uint32, 7 float32, 8 float64).
 struct PointField {

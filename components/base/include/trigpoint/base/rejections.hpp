@@ -17,14 +17,25 @@ namespace trigpoint {
 enum class RejectionKind {
   kFixRefused,  ///< also every name that is not known: a foreign filter's own reasons
   kNote,        ///< the fix was used all the same, or it is not about a fix
-  kImu          ///< a refused IMU sample
+  kImu,         ///< a refused IMU sample
+  kTwist,       ///< a refused message of an optional input
+  kYaw          ///< the same
 };
 
 inline RejectionKind kind_of_rejection(std::string_view name) {
-  constexpr std::array<std::string_view, 4> kNotes{
-      "recovered", "state_not_finite", "output_not_finite", "datum_not_a_place"};
+  constexpr std::array<std::string_view, 5> kNotes{"recovered",
+                                                   "state_not_finite",
+                                                   "covariance_restored",
+                                                   "output_not_finite",
+                                                   "datum_not_a_place"};
   if (name.starts_with("imu_")) {
     return RejectionKind::kImu;
+  }
+  if (name.starts_with("twist_")) {
+    return RejectionKind::kTwist;
+  }
+  if (name.starts_with("yaw_")) {
+    return RejectionKind::kYaw;
   }
   const bool note =
       name.starts_with("used_") || std::find(kNotes.begin(), kNotes.end(), name) != kNotes.end();

@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 
 #include <string>
+#include <vector>
 
 namespace trigpoint {
 
@@ -24,6 +25,16 @@ struct RobotConfig {
   std::string points_topic{"points"};
   std::string imu_topic{"imu/data"};
   std::string fix_topic{"gps/fix"};
+  // Optional inputs of gps_odometry; empty: none.
+  std::string twist_topic;
+  std::string twist_message{"TwistWithCovarianceStamped"};
+  std::string yaw_topic;
+  // Frames that a message may be in; none listed: any.
+  std::vector<std::string> imu_frame_ids;
+  std::vector<std::string> fix_frame_ids;
+  std::vector<std::string> twist_frame_ids;
+  /// Added to the altitude of fixes: 0 for heights above the ellipsoid.
+  double geoid_undulation_m{0.0};
 
   Pose T_base_lidar() const;
   Eigen::Quaterniond q_base_imu() const;

@@ -2,8 +2,8 @@
 // Copyright the Trigpoint developers
 // The plain structs of base as serialised ROS 2 messages: XCDR1 with the 4-byte encapsulation
 // header, as rosbag2 stores them. Needs no DDS and no generated type (library trigpoint::codec).
-// Plain is one of ImuSample, GnssFix, PointCloudMessage, Odometry, Datum (a NavSatFix on the wire),
-// GpsStatus, LioStatus, StateUpdate, FusionStatus.
+// Plain is one of ImuSample, GnssFix, PointCloudMessage, TwistMeasurement, YawMeasurement (an Imu
+// on the wire), Odometry, Datum (a NavSatFix), GpsStatus, LioStatus, StateUpdate, FusionStatus.
 #pragma once
 
 #include "trigpoint/base/measurements.hpp"

@@ -11,6 +11,7 @@
 #include "trigpoint/base/messages.hpp"
 
 #include "diagnostic_msgs.h"
+#include "geometry_msgs.h"
 #include "nav_msgs.h"
 #include "rosgraph_msgs.h"
 #include "sensor_msgs.h"
@@ -29,6 +30,11 @@ sensor_msgs::msg::Imu to_message(const ImuSample& imu);
 sensor_msgs::msg::NavSatFix to_message(const GnssFix& fix);
 sensor_msgs::msg::PointCloud2 to_message(const PointCloudMessage& cloud);
 nav_msgs::msg::Odometry to_message(const Odometry& odometry);
+geometry_msgs::msg::TwistWithCovarianceStamped to_message(const TwistMeasurement& twist);
+/// As the twist of an Odometry whose pose is unknown.
+nav_msgs::msg::Odometry to_odometry_message(const TwistMeasurement& twist);
+/// An Imu of which only the orientation is known.
+sensor_msgs::msg::Imu to_message(const YawMeasurement& yaw);
 sensor_msgs::msg::NavSatFix to_message(const Datum& datum);
 trigpoint_msgs::msg::GpsStatus to_message(const GpsStatus& status);
 trigpoint_msgs::msg::LioStatus to_message(const LioStatus& status);
@@ -42,6 +48,11 @@ PointCloudMessage from_message(const sensor_msgs::msg::PointCloud2& message);
 /// Takes the bytes over instead of copying them.
 PointCloudMessage from_message(sensor_msgs::msg::PointCloud2&& message);
 Odometry from_message(const nav_msgs::msg::Odometry& message);
+TwistMeasurement twist_from_message(const geometry_msgs::msg::TwistWithCovarianceStamped& message);
+/// The twist of an Odometry, which is in its child frame.
+TwistMeasurement twist_from_message(const nav_msgs::msg::Odometry& message);
+/// The orientation as it came, also when it is not of unit length: the core judges it.
+YawMeasurement yaw_from_message(const sensor_msgs::msg::Imu& message);
 Datum datum_from_message(const sensor_msgs::msg::NavSatFix& message);
 GpsStatus from_message(const trigpoint_msgs::msg::GpsStatus& message);
 LioStatus from_message(const trigpoint_msgs::msg::LioStatus& message);

@@ -9,6 +9,7 @@
 #include "trigpoint/bus/qos.hpp"
 
 #include "diagnostic_msgs.h"
+#include "geometry_msgs.h"
 #include "nav_msgs.h"
 #include "rosgraph_msgs.h"
 #include "sensor_msgs.h"
@@ -23,6 +24,14 @@ inline constexpr Topic<sensor_msgs::msg::PointCloud2> points{
     qos::kDefault.with_depth(40).as_bulk()};
 inline constexpr Topic<sensor_msgs::msg::Imu> imu{"imu/data", qos::kDefault.with_depth(1000)};
 inline constexpr Topic<sensor_msgs::msg::NavSatFix> fix{"gps/fix", qos::kDefault.with_depth(100)};
+
+// Optional, and named by RobotConfig alone.
+inline constexpr Topic<geometry_msgs::msg::TwistWithCovarianceStamped> twist{
+    "twist",
+    qos::kDefault.with_depth(100)};
+inline constexpr Topic<nav_msgs::msg::Odometry> twist_odometry{"twist",
+                                                               qos::kDefault.with_depth(100)};
+inline constexpr Topic<sensor_msgs::msg::Imu> yaw{"yaw", qos::kDefault.with_depth(100)};
 
 inline constexpr Topic<rosgraph_msgs::msg::Clock> clock{"clock", qos::kClock};
 

@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -24,11 +25,18 @@ struct Geographic {
 /// can. Ranges: research/gps E (|lat| <= 90, |lon| <= 180, |h| < 20 km, finite, not exactly 0, 0).
 std::optional<std::string> find_fault(const Geographic& place);
 
-/// `map`: east-north-up tangent plane at the datum (GeographicLib LocalCartesian, true z).
+/// How a place becomes a position in map. Both give the same east-north-up axes and true metres.
+enum class Projection : std::uint8_t {
+  kEnu,  ///< GeographicLib LocalCartesian
+  kUtm   ///< through UTM, the paper's (6)-(7), with convergence, scale and height taken out
+};
+
+/// `map`: east-north-up tangent plane at the datum, true z.
 class LocalFrame {
  public:
-  /// Throws std::invalid_argument with the reason when the datum is not a place.
-  explicit LocalFrame(const Datum& datum);
+  /// Throws std::invalid_argument with the reason when the datum is not a place, or has no UTM zone
+  /// where UTM is asked for.
+  explicit LocalFrame(const Datum& datum, Projection projection = Projection::kEnu);
   ~LocalFrame();
   LocalFrame(const LocalFrame&);
   LocalFrame& operator=(const LocalFrame&);
@@ -36,6 +44,7 @@ class LocalFrame {
   LocalFrame& operator=(LocalFrame&&) noexcept;
 
   const Datum& datum() const;
+  Projection projection() const;
 
   /// Position in map (m), or nullopt when the place has a fault or the result is not finite.
   std::optional<Eigen::Vector3d> to_map(const Geographic& place) const;
@@ -70,5 +79,11 @@ UtmZone utm_zone_of(const Datum& datum);
 
 /// nullopt when the place has a fault or cannot be projected (|lat| > 84).
 std::optional<UtmPosition> to_utm(const Geographic& place, const UtmZone& zone);
+
+/// The way back; nullopt where there is none. Convergence and scale come with `to_utm`.
+std::optional<Geographic> from_utm(double easting_m,
+                                   double northing_m,
+                                   double height_m,
+                                   const UtmZone& zone);
 
 }  // namespace trigpoint::geodesy

@@ -70,6 +70,9 @@ struct Config {
   double datum_height_m{0.0};
   double datum_wait_s{2.0};
   std::int64_t datum_fixes{10};
+  std::string projection{"enu"};
+  double warn_distance_m{10e3};
+  double highest_distance_m{50e3};
 
   // Fix checks.
   double future_limit_s{0.1};
@@ -78,6 +81,11 @@ struct Config {
   double recovery_s{5.0};
   double gate_probability{0.999};
   std::int64_t frozen_fixes{3};
+
+  // A clock of the fixes that is not the IMU's.
+  double clock_latest_s{5.0};
+  double clock_latency_s{0.1};
+  double clock_latency_sigma_s{0.05};
 
   // What a fix is worth: sigma of a class that sends no covariance, scale of reported sigma, share
   // of its variance that is correlated in time and never averages out, floors of what is published.
@@ -111,6 +119,17 @@ struct Config {
   double heading_speed_mps{0.4};
   double heading_converged_rad{0.17};
   double heading_lost_rad{0.8};
+
+  // Optional inputs: velocity and heading.
+  double twist_interval_s{0.1};
+  double twist_default_sigma_mps{0.2};
+  double twist_floor_sigma_mps{0.05};
+  double twist_share{0.03};
+  Eigen::Vector3d twist_point_base_m{0.0, 0.0, 0.0};
+  double yaw_interval_s{0.5};
+  double yaw_offset_rad{0.0};
+  double yaw_default_sigma_rad{0.35};
+  double yaw_floor_sigma_rad{0.035};
 
   Eskf18Config eskf18;
 };

@@ -35,6 +35,10 @@ class GpsOdometry {
   Output on_imu(const ImuSample& sample);
   /// Late fixes are applied at their own stamp (rewind buffer).
   Output on_fix(const GnssFix& fix);
+  /// Optional: velocity of the vehicle in base_link's axes, and its heading. Late ones are applied
+  /// at their own stamp; only events come back.
+  Output on_twist(const TwistMeasurement& twist);
+  Output on_yaw(const YawMeasurement& yaw);
   /// Adopts a datum that somebody else elected (or configuration gave); an older election replaces
   /// the present one and is announced as a reset.
   Output on_datum(const Datum& datum);

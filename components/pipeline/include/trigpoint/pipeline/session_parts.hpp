@@ -97,6 +97,8 @@ class LogPart {
   Nanoseconds last_ns_{0};
   std::uint64_t sweeps_{0};
   std::uint64_t imu_{0};
+  std::uint64_t twists_{0};
+  std::uint64_t yaws_{0};
   std::uint64_t fixes_fed_{0};
   std::uint64_t fixes_withheld_{0};
 };

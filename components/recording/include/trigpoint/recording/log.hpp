@@ -23,7 +23,8 @@ class LogError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-using Measurement = std::variant<ImuSample, GnssFix, PointCloudMessage>;
+using Measurement =
+    std::variant<ImuSample, GnssFix, PointCloudMessage, TwistMeasurement, YawMeasurement>;
 
 /// One input in the order in which it became available.
 struct LogEntry {
@@ -51,7 +52,7 @@ struct LogSummary {
 
 /// Messages that were passed over because they are not what their topic promises.
 struct Undecodable {
-  std::string input;   ///< "points", "imu" or "fix"
+  std::string input;   ///< "points", "imu", "fix", "twist" or "yaw"
   std::string topic;   ///< as the log spells it
   std::string reason;  ///< e.g. "not a sensor_msgs/msg/Imu"
   std::uint64_t count{0};
@@ -62,7 +63,7 @@ class LogReader {
   virtual ~LogReader() = default;
 
   virtual const LogSummary& summary() const = 0;
-  /// The next entry of the three mapped topics in order of receive_ns; nullopt at the end. Throws
+  /// The next entry of the mapped topics in order of receive_ns; nullopt at the end. Throws
   /// LogError when the log breaks off; what came before stays valid.
   virtual std::optional<LogEntry> next() = 0;
   /// 0 to 1, for progress bars.
@@ -94,6 +95,7 @@ struct LogOptions {
   bool require_points{true};  ///< without this topic the log is refused
   bool require_imu{true};
   bool require_fix{true};
+  bool require_aiding{true};      ///< where the robot has a topic for twists or yaws
   double fix_rate_limit_hz{0.0};  ///< fixes beyond this rate are delivered as withheld; 0 = all fed
   double start_s{0.0};            ///< skip this much, s after the log's first entry
   double duration_s{0.0};         ///< then deliver this much; 0 = to the end

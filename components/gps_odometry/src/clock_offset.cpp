@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "clock_offset.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace trigpoint::gps_odometry {
+
+namespace {
+
+// Drift of the clocks that is followed, as a share of time.
+constexpr double kLeak = 1e-3;
+// Differences within this are one clock with an uneven latency; a step beyond is another clock.
+constexpr Nanoseconds kStep_ns = kNanosecondsPerSecond / 2;
+// So many fixes over so long must agree on a new offset.
+constexpr std::size_t kAgreeing = 3;
+constexpr Nanoseconds kAgreeing_ns = kNanosecondsPerSecond;
+constexpr Nanoseconds kLongestAgreement_ns = 10 * kNanosecondsPerSecond;
+constexpr std::size_t kHeard = 32;
+
+std::string seconds(Nanoseconds duration_ns) {
+  return std::to_string(to_seconds(duration_ns)) + " s";
+}
+
+}  // namespace
+
+ClockOffset::ClockOffset(const Config& config)
+    : future_limit_ns_(from_seconds(config.future_limit_s)),
+      rewind_ns_(from_seconds(config.rewind_s)),
+      latest_ns_(from_seconds(std::max(config.clock_latest_s, config.rewind_s))),
+      latency_ns_(from_seconds(config.clock_latency_s)),
+      latency_sigma_s_(config.clock_latency_sigma_s) {}
+
+bool ClockOffset::can_be_latency(Nanoseconds difference_ns) const {
+  return difference_ns <= future_limit_ns_ && difference_ns >= -rewind_ns_;
+}
+
+bool ClockOffset::is_known(Nanoseconds difference_ns) const {
+  return is_estimated_ ? std::abs(difference_ns - soonest_ns_) <= kStep_ns
+                       : can_be_latency(difference_ns);
+}
+
+/// A fix that is merely late has stamps that go on; only a clock goes back, or is off by more than
+/// any link is slow.
+bool ClockOffset::is_other_clock(Nanoseconds stamp_ns, Nanoseconds difference_ns) const {
+  if (is_estimated_ || difference_ns > future_limit_ns_ || difference_ns < -latest_ns_ ||
+      !candidates_.empty()) {
+    return true;
+  }
+  return newest_stamp_ns_ && stamp_ns < *newest_stamp_ns_ - kStep_ns;
+}
+
+bool ClockOffset::heard_before(Nanoseconds stamp_ns) {
+  if (std::find(heard_.begin(), heard_.end(), stamp_ns) != heard_.end()) {
+    return true;
+  }
+  heard_.push_back(stamp_ns);
+  if (heard_.size() > kHeard) {
+    heard_.pop_front();
+  }
+  return false;
+}
+
+/// Only fixes in a row that agree with each other are kept; a silent IMU or a frozen clock makes
+/// differences that run away.
+void ClockOffset::keep(const Candidate& candidate) {
+  const auto contradicts = [&](const Candidate& other) {
+    return std::abs(other.difference_ns - candidate.difference_ns) > kStep_ns ||
+           candidate.imu_ns < other.imu_ns ||
+           candidate.imu_ns - other.imu_ns > kLongestAgreement_ns;
+  };
+  if (std::any_of(candidates_.begin(), candidates_.end(), contradicts)) {
+    candidates_.clear();
+  }
+  candidates_.push_back(candidate);
+}
+
+std::optional<Nanoseconds> ClockOffset::agreed() const {
+  if (candidates_.size() < kAgreeing ||
+      candidates_.back().imu_ns - candidates_.front().imu_ns < kAgreeing_ns) {
+    return std::nullopt;
+  }
+  return std::max_element(candidates_.begin(),
+                          candidates_.end(),
+                          [](const Candidate& a, const Candidate& b) {
+                            return a.difference_ns < b.difference_ns;
+                          })
+      ->difference_ns;
+}
+
+ClockVerdict ClockOffset::known(Nanoseconds stamp_ns, const Candidate& now) {
+  candidates_.clear();
+  newest_stamp_ns_ = std::max(newest_stamp_ns_.value_or(stamp_ns), stamp_ns);
+  if (!is_estimated_) {
+    return {stamp_ns, "", "", std::nullopt, false};
+  }
+  if (heard_before(stamp_ns)) {
+    return {std::nullopt,
+            "duplicate_stamp",
+            "Fix refused: there was one with its stamp already.",
+            std::nullopt,
+            false};
+  }
+  const double elapsed_s = std::max(0.0, to_seconds(now.imu_ns - soonest_imu_ns_));
+  soonest_ns_ = std::max(now.difference_ns, soonest_ns_ - from_seconds(kLeak * elapsed_s));
+  soonest_imu_ns_ = now.imu_ns;
+  return {stamp_ns - offset_ns(), "", "", std::nullopt, false};
+}
+
+ClockVerdict ClockOffset::other(Nanoseconds stamp_ns, const Candidate& now) {
+  keep(now);
+  if (const auto soonest_ns = agreed()) {
+    is_estimated_ = !can_be_latency(*soonest_ns);
+    soonest_ns_ = *soonest_ns;
+    soonest_imu_ns_ = now.imu_ns;
+    newest_stamp_ns_.reset();
+    heard_.clear();
+    ClockVerdict verdict = known(stamp_ns, now);
+    verdict.event = Event{
+        Severity::kWarning,
+        now.imu_ns,
+        "gnss_clock_known",
+        is_estimated_
+            ? "The fixes' clock is " + seconds(offset_ns()) + " ahead of the IMU's, by " +
+                  std::to_string(kAgreeing) + " fixes or more over 1 s: their stamps are put right."
+            : std::string("The fixes' clock is the IMU's: their stamps are used as they are.")};
+    return verdict;
+  }
+  const Nanoseconds moved_ns = now.difference_ns - (is_estimated_ ? soonest_ns_ : 0);
+  ClockVerdict verdict;
+  verdict.is_ahead = moved_ns > 0;
+  if (is_estimated_) {
+    verdict.reason = "clock_jump";
+    verdict.text = "Fix refused: its clock is " + seconds(moved_ns) +
+                   " off what was estimated, expected at most " + seconds(kStep_ns) + ".";
+  } else {
+    verdict.stamp_ns = stamp_ns;  // refused for what it seems to be, future or past
+  }
+  if (candidates_.size() == 2) {
+    verdict.event = Event{Severity::kWarning,
+                          now.imu_ns,
+                          "gnss_clock_moved",
+                          "The fixes' clock is " + seconds(moved_ns) +
+                              " off: fixes are not used until enough of them agree on its offset."};
+  }
+  return verdict;
+}
+
+ClockVerdict ClockOffset::place(Nanoseconds fix_stamp_ns, Nanoseconds imu_ns) {
+  const Candidate now{fix_stamp_ns - imu_ns, imu_ns};
+  if (is_known(now.difference_ns)) {
+    return known(fix_stamp_ns, now);
+  }
+  if (is_other_clock(fix_stamp_ns, now.difference_ns)) {
+    return other(fix_stamp_ns, now);
+  }
+  return {fix_stamp_ns, "", "", std::nullopt, false};  // late
+}
+
+}  // namespace trigpoint::gps_odometry
