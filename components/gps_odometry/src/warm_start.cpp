@@ -33,6 +33,11 @@ constexpr double kLeastSpeed_mps = 0.1;
 constexpr double kMostYaw_rad = 0.6;
 constexpr double kMostSpeed_mps = 5.0;
 constexpr double kMostPosition_m = 100.0;
+// Finite is not enough: beyond these, rounding alone makes a covariance indefinite.
+constexpr double kNotUnit = 0.05;
+constexpr double kFarthest_m = 1e6;
+constexpr double kFastest_mps = 350.0;
+constexpr double kFastestTurn_radps = 35.0;  // as of the IMU
 
 bool is_positive(const Matrix3d& covariance) {
   return covariance.allFinite() && covariance.diagonal().minCoeff() > 0.0 &&
@@ -72,6 +77,16 @@ std::optional<std::string> find_warm_start_fault(const Odometry& odometry,
       !odometry.angular_radps.allFinite() || !is_positive(position) || !is_positive(rotation) ||
       !is_positive(velocity)) {
     return "it is not finite, or a covariance is not positive";
+  }
+  if (!(std::abs(odometry.T_frame_child.q.norm() - 1.0) < kNotUnit)) {
+    return "its quaternion's norm is " + std::to_string(odometry.T_frame_child.q.norm()) +
+           ", expected 1";
+  }
+  if (odometry.T_frame_child.p.norm() > kFarthest_m || odometry.linear_mps.norm() > kFastest_mps ||
+      odometry.angular_radps.norm() > kFastestTurn_radps) {
+    return "it is " + std::to_string(odometry.T_frame_child.p.norm() * 1e-3) +
+           " km from the datum, at " + std::to_string(odometry.linear_mps.norm()) + " m/s and " +
+           std::to_string(odometry.angular_radps.norm()) + " rad/s";
   }
   if (std::sqrt(rotation(2, 2)) > kMostYaw_rad || largest_sigma(velocity) > kMostSpeed_mps ||
       largest_sigma(position) > kMostPosition_m) {
