@@ -7,17 +7,19 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <sstream>
+#include <vector>
 
 namespace trigpoint::evaluation {
 
 namespace {
 
-constexpr int kWidth_px = 1200;
-constexpr int kPanelHeight_px = 240;
+constexpr int kWidth_px = 1500;
+constexpr int kPanelHeight_px = 300;
+constexpr int kAllHeight_px = 560;
 constexpr double kSigmas = 3.0;
-constexpr double kLeast_m = 1e-3;  // of the logarithmic scale
+constexpr double kLeast_m = 1e-3;   // of the logarithmic scale
+constexpr double kLinear_m = 0.03;  // about where the bands' scale turns from linear to logarithmic
 constexpr std::array<const char*, 3> kAxes{"east", "north", "up"};
 constexpr std::array<const char*, 4> kColours{"#1f6fbf", "#2a9d4a", "#c0392b", "#7d3c98"};
 
@@ -38,7 +40,20 @@ DataFile rows_of(const FilterErrors& filter) {
   return rows;
 }
 
-std::string frame_of(const GpsPage& page, int panels, const std::string& title) {
+/// The text of a gnuplot string in single quotes.
+std::string quoted(const std::string& text) {
+  std::string result = "'";
+  for (const char c : text) {
+    result += c;
+    if (c == '\'') {
+      result += c;
+    }
+  }
+  return result + "'";
+}
+
+/// What all panels have: time axis, grid, the outage shaded.
+std::string frame_of(const GpsPage& page) {
   double from_s = page.outage_from_s;
   double to_s = page.outage_to_s;
   for (const FilterErrors& filter : page.filters) {
@@ -48,45 +63,63 @@ std::string frame_of(const GpsPage& page, int panels, const std::string& title) 
     }
   }
   std::ostringstream text;
-  text << "set multiplot layout " << panels << ",1 title '" << title
-       << "' margins 0.08,0.8,0.09,0.93 spacing 0.04\n"
-       << "set xrange [" << from_s << ":" << to_s << "]\n"
-       << "set grid lc rgb '#dddddd'\nset tics out nomirror\n"
-       << "set key outside right top Left reverse samplen 2\nset format x ''\n"
+  text << "set xrange [" << from_s << ":" << to_s << "]\n"
+       << "set grid lc rgb '#cccccc' lw 0.5\nset tics out nomirror\n"
        << "set object 1 rectangle from " << page.outage_from_s << ", graph 0 to "
-       << page.outage_to_s << ", graph 1 fc rgb '#f6e3e3' fs solid noborder behind\n";
+       << page.outage_to_s << ", graph 1 fc rgb '#f3d9d9' fs solid noborder behind\n";
   return text.str();
 }
 
-/// The band is clipped to what the errors need, so that a wide one does not flatten the curve.
-std::string axis_range(const FilterErrors& filter, Eigen::Index axis) {
-  double most_m = 0.05;
-  double band_m = 0.05;
-  for (const ErrorSample& sample : filter.samples) {
-    most_m = std::max(most_m, std::abs(sample.error_m(axis)));
-    band_m = std::max(band_m, kSigmas * sample.sigma_m(axis));
+/// One scale for all panels, linear about 0 and logarithmic outside, so that centimetres before an
+/// outage and the tens of metres at its end are both seen, and filters can be compared.
+std::string signed_logarithmic_scale(const GpsPage& page) {
+  double most_m = 1.0;
+  for (const FilterErrors& filter : page.filters) {
+    for (const ErrorSample& sample : filter.samples) {
+      most_m = std::max(
+          {most_m, sample.error_m.cwiseAbs().maxCoeff(), kSigmas * sample.sigma_m.maxCoeff()});
+    }
   }
-  const double range_m = std::min(1.05 * std::max(most_m, band_m), 6.0 * most_m);
-  return "set yrange [" + std::to_string(-range_m) + ":" + std::to_string(range_m) + "]\n";
+  std::ostringstream text;
+  text << "set nonlinear y via asinh(y/" << kLinear_m << ") inverse " << kLinear_m
+       << "*sinh(y)\nset yrange [" << -1.3 * most_m << ":" << 1.3 * most_m << "]\nset ytics (0";
+  for (double tic_m = 0.1; tic_m < 1.3 * most_m; tic_m *= 10.0) {
+    text << ", " << tic_m << ", " << -tic_m;
+  }
+  text << ")\n";
+  return text.str();
 }
 
-void draw_filter(const GpsPage& page,
-                 const FilterErrors& filter,
-                 const std::string& folder,
-                 const std::string& gnuplot) {
-  const Picture picture(folder + "/plots", filter.name);
-  const std::string data = picture.data(filter.name + ".dat", rows_of(filter));
+void draw_bands(const GpsPage& page, const std::string& folder, const std::string& gnuplot) {
+  const Picture picture(folder + "/plots", "bands");
+  const std::size_t columns = page.filters.size();
+  std::vector<std::string> data;
+  for (const FilterErrors& filter : page.filters) {
+    data.push_back(picture.data("bands_" + filter.name + ".dat", rows_of(filter)));
+  }
   std::ostringstream body;
-  body << frame_of(page, 3, filter.name + ": error and 3 sigma") << "set style fill solid 1.0\n";
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    const char* name = kAxes.at(static_cast<std::size_t>(axis));
-    body << axis_range(filter, axis) << "set ylabel '" << name << " [m]'\n";
-    if (axis == 2) {
-      body << "set format x '%g'\nset xlabel 'time [s]'\n";
+  body << "set multiplot layout 3," << columns << " title "
+       << quoted(page.title + ": error and 3 sigma band, outage shaded")
+       << " noenhanced margins 0.055,0.99,0.07,0.9 spacing 0.035,0.03\n"
+       << frame_of(page) << signed_logarithmic_scale(page);
+  for (std::size_t axis = 0; axis < kAxes.size(); ++axis) {
+    const bool is_lowest = axis + 1 == kAxes.size();
+    for (std::size_t i = 0; i < columns; ++i) {
+      body << (axis == 0
+                   ? "set title " + quoted(page.filters[i].name) + " noenhanced offset 0,-0.5\n"
+                   : "unset title\n")
+           << (is_lowest ? "set format x '%g'\nset xlabel 'time since the start [s]'\n"
+                         : "set format x ''\n")
+           << (i == 0 ? std::string("set ylabel 'error ") + kAxes.at(axis) + " [m]' offset 1,0\n"
+                      : "unset ylabel\n")
+           << (axis == 0 && i == 0 ? "set key top left Left reverse opaque samplen 2\n"
+                                   : "unset key\n")
+           << "plot " << data[i] << " using 1:(-$" << 5 + axis << "):" << 5 + axis
+           << " with filledcurves fs transparent solid 0.55 noborder lc rgb '#8fb8e0' "
+              "title '3 sigma', \\\n     "
+           << data[i] << " using 1:" << 2 + axis
+           << " with lines lw 1.5 lc rgb '#12305c' title 'error'\n";
     }
-    body << "plot " << data << " using 1:(-$" << 5 + axis << "):" << 5 + axis
-         << " with filledcurves lc rgb '#c9ddf2' title '3 sigma', \\\n     " << data
-         << " using 1:" << 2 + axis << " with lines lw 1.5 lc rgb '#1f3f6f' title 'error'\n";
   }
   body << "unset multiplot\n";
   picture.draw(gnuplot, kWidth_px, 3 * kPanelHeight_px, body.str());
@@ -95,18 +128,22 @@ void draw_filter(const GpsPage& page,
 void draw_all(const GpsPage& page, const std::string& folder, const std::string& gnuplot) {
   const Picture picture(folder + "/plots", "all");
   std::ostringstream body;
-  body << frame_of(page, 1, "All filters: 3-D error (line) and 3 sigma (dashed)")
-       << "set logscale y\nset ylabel '[m]'\nset format x '%g'\nset xlabel 'time [s]'\nplot ";
+  body << "set title " << quoted(page.title + ": 3-D error and 3 sigma, outage shaded")
+       << " noenhanced\n"
+       << frame_of(page)
+       << "set logscale y\nset format y '10^{%T}'\nset key outside right top Left reverse\n"
+          "set ylabel '3-D position error [m]'\nset xlabel 'time since the start [s]'\nplot ";
   for (std::size_t i = 0; i < page.filters.size(); ++i) {
     const FilterErrors& filter = page.filters[i];
     const std::string data = picture.data("all_" + filter.name + ".dat", rows_of(filter));
     const char* colour = kColours.at(i % kColours.size());
     body << (i == 0 ? "" : ", \\\n     ") << data << " using 1:8 with lines lw 1.5 lc rgb '"
-         << colour << "' title '" << filter.name << "' noenhanced, \\\n     " << data
-         << " using 1:9 with lines lw 1.5 dt 2 lc rgb '" << colour << "' notitle";
+         << colour << "' title " << quoted(filter.name + " error") << " noenhanced, \\\n     "
+         << data << " using 1:9 with lines lw 2 dt 2 lc rgb '" << colour << "' title "
+         << quoted(filter.name + " 3 sigma") << " noenhanced";
   }
-  body << "\nunset multiplot\n";
-  picture.draw(gnuplot, kWidth_px, 2 * kPanelHeight_px, body.str());
+  body << "\n";
+  picture.draw(gnuplot, kWidth_px, kAllHeight_px, body.str());
 }
 
 std::string html_of(const GpsPage& page) {
@@ -115,11 +152,10 @@ std::string html_of(const GpsPage& page) {
        << "</title></head>\n<body style=\"font-family: sans-serif; margin: 1em\">\n<h1>"
        << page.title << "</h1>\n<p>No fixes from " << page.outage_from_s << " to "
        << page.outage_to_s << " s (shaded). Bands are three times the published sigma.</p>\n"
-       << "<p><img src=\"all.png\" alt=\"all filters\"></p>\n";
-  for (const FilterErrors& filter : page.filters) {
-    html << "<p><img src=\"" << filter.name << ".png\" alt=\"" << filter.name << "\"></p>\n";
-  }
-  html << "</body></html>\n";
+       << "<p><img src=\"bands.png\" alt=\"error and 3 sigma band of every filter and axis\"></p>\n"
+       << "<p>The scale is linear about 0 and logarithmic outside; it is the same in all "
+          "panels.</p>\n<p><img src=\"all.png\" alt=\"3-D errors of all filters\"></p>\n"
+       << "</body></html>\n";
   return html.str();
 }
 
@@ -128,9 +164,7 @@ std::string html_of(const GpsPage& page) {
 std::string draw_gps_page(const GpsPage& page,
                           const std::string& folder,
                           const std::string& gnuplot) {
-  for (const FilterErrors& filter : page.filters) {
-    draw_filter(page, filter, folder, gnuplot);
-  }
+  draw_bands(page, folder, gnuplot);
   draw_all(page, folder, gnuplot);
   const std::string file = exporter::path_in(folder, "index.html");
   exporter::write_text(file, html_of(page));

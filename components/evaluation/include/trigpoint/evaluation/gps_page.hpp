@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
 // A page of pictures: error of GPS filters with the band of three sigma that they publish, through
-// an outage, one picture a filter and one with all of them.
+// an outage: a picture with a column a filter and a row an axis, and one of the 3-D errors.
 #pragma once
 
 #include <Eigen/Core>
@@ -30,8 +30,8 @@ struct GpsPage {
   std::vector<FilterErrors> filters;
 };
 
-/// Writes index.html and a PNG a filter into `folder`, scripts and data into its plots/. Returns
-/// the page's path. Throws std::runtime_error naming what failed.
+/// Writes index.html, bands.png and all.png into `folder`, scripts and data into its plots/.
+/// Returns the page's path. Throws std::runtime_error naming what failed.
 std::string draw_gps_page(const GpsPage& page,
                           const std::string& folder,
                           const std::string& gnuplot = "gnuplot");
