@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
+#include "trigpoint/base/config.hpp"
 #include "trigpoint/evaluation/gps_page.hpp"
 #include "trigpoint/gps_odometry/gps_odometry.hpp"
 #include "trigpoint/simulator/simulator.hpp"
 
+#include "input.hpp"
+#include "number_checks.hpp"
 #include "verbs.hpp"
 
 #include <array>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <variant>
@@ -67,6 +71,12 @@ evaluation::FilterErrors drive(const simulator::Scenario& scenario,
 }
 
 int run(const GpsPlotOptions& options) {
+  refuse_used_folder(options.out);
+  if (std::filesystem::exists(std::filesystem::path(options.out) / "index.html")) {
+    throw ConfigError("gps-plots: " + options.out +
+                      " has an index.html already; expected a new folder for --out.");
+  }
+  scenario_duration_s(options.outage_from_s + options.outage_s + options.around_s);
   const simulator::Scenario scenario = simulator::load_scenario(options.scenario);
   evaluation::GpsPage page;
   page.title =
@@ -84,19 +94,23 @@ int run(const GpsPlotOptions& options) {
 
 void add_gps_plots(CLI::App& app, Chosen& chosen) {
   CLI::App* verb = app.add_subcommand(
-      "gps-plots", "A page of pictures: the GPS filters' error and 3 sigma through an outage");
+      "gps-plots",
+      "A page of pictures: error and 3 sigma of ekf15, eskf18 and the published filter "
+      "(ekf15_strict) through an outage of a simulated drive");
   const auto options = std::make_shared<GpsPlotOptions>();
   verb->add_option("--scenario", options->scenario, "a .yaml file, or the name of a shipped one")
       ->capture_default_str();
-  verb->add_option("--seed", options->seed, "of the world and of the noise")->capture_default_str();
+  verb->add_option("--seed", options->seed, "of the world and of the noise")
+      ->check(whole_number())
+      ->capture_default_str();
   verb->add_option("--outage-from", options->outage_from_s, "s after the start")
-      ->check(CLI::NonNegativeNumber)
+      ->check(more_than_zero())
       ->capture_default_str();
   verb->add_option("--outage", options->outage_s, "s without fixes")
-      ->check(CLI::NonNegativeNumber)
+      ->check(more_than_zero())
       ->capture_default_str();
   verb->add_option("--around", options->around_s, "s shown before and after it")
-      ->check(CLI::NonNegativeNumber)
+      ->check(more_than_zero())
       ->capture_default_str();
   verb->add_option("--out", options->out, "folder, created when missing")->required();
   verb->callback([options, &chosen] { chosen = [options] { return run(*options); }; });
