@@ -411,10 +411,6 @@ void InsTracker::recover(InsTrack& track, const MapFix& fix, Part part) const {
   const int count = kSpans[part].count;
   const bool lost = track.parts[part].filter_is_suspect && part == kHorizontal;
   const Vector3d apart = fix.antenna_map_m - antenna(track.filter, lever_base_m_);
-  // If it is the fixes that are wrong, the truth is where the filter was, give or take what that
-  // was worth: the error has the second moment apart^2 + P.
-  const Vector3d known_m2 = track.filter.P.diagonal().segment<3>(ins::kPosition);
-  const Vector3d doubt_m = (apart.cwiseAbs2() + known_m2).cwiseSqrt();
   for_each(track, [&](Eskf18& filter) {
     renew_fix_error(filter, fix, part);
     for (int i = first; i < first + count; ++i) {
@@ -426,7 +422,7 @@ void InsTracker::recover(InsTrack& track, const MapFix& fix, Part part) const {
     }
   });
   for (int i = first; i < first + count; ++i) {
-    track.doubt_m(i) = std::max(track.doubt_m(i), doubt_m(i));
+    track.doubt_m(i) = std::max(track.doubt_m(i), std::abs(apart(i)));
   }
   track.doubt_until_ns = fix.checked.stamp_ns + from_seconds(config_.eskf18.doubt_hold_s);
   track.parts[part] = Contradiction{};
