@@ -30,7 +30,7 @@ constexpr double kLeastTilt_rad = 0.02;
 constexpr double kLeastYaw_rad = 0.2;
 constexpr double kLeastSpeed_mps = 0.1;
 // An odometry that is less certain than this is no better than the next fix.
-constexpr double kMostYaw_rad = 0.6;
+constexpr double kMostRotation_rad = 0.6;
 constexpr double kMostSpeed_mps = 5.0;
 constexpr double kMostPosition_m = 100.0;
 // Finite is not enough: beyond these, rounding alone makes a covariance indefinite.
@@ -88,10 +88,10 @@ std::optional<std::string> find_warm_start_fault(const Odometry& odometry,
            " km from the datum, at " + std::to_string(odometry.linear_mps.norm()) + " m/s and " +
            std::to_string(odometry.angular_radps.norm()) + " rad/s";
   }
-  if (std::sqrt(rotation(2, 2)) > kMostYaw_rad || largest_sigma(velocity) > kMostSpeed_mps ||
+  if (largest_sigma(rotation) > kMostRotation_rad || largest_sigma(velocity) > kMostSpeed_mps ||
       largest_sigma(position) > kMostPosition_m) {
     return "its sigmas are " + std::to_string(largest_sigma(position)) + " m, " +
-           std::to_string(std::sqrt(rotation(2, 2))) + " rad of yaw and " +
+           std::to_string(largest_sigma(rotation)) + " rad and " +
            std::to_string(largest_sigma(velocity)) + " m/s";
   }
   return std::nullopt;

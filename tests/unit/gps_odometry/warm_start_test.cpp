@@ -238,6 +238,7 @@ TEST(WarmStartFault, is_found_in_frame_datum_covariance_and_heading) {
   EXPECT_NE(fault([](Odometry&) {}, ""), "");
   EXPECT_NE(fault([](Odometry& o) { o.pose_covariance(1, 1) = 0.0; }), "");
   EXPECT_NE(fault([](Odometry& o) { o.pose_covariance(5, 5) = 1e6; }), "");
+  EXPECT_NE(fault([](Odometry& o) { o.pose_covariance(3, 3) = 1e300; }), "");
   EXPECT_NE(fault([](Odometry& o) { o.twist_covariance *= 1e9; }), "");
   EXPECT_NE(fault([](Odometry& o) { o.T_frame_child.p.x() = kNaN; }), "");
 }
