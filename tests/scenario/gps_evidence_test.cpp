@@ -255,19 +255,26 @@ TEST(Fault, cluster_after_a_blackout_is_never_followed_in_silence) {
     double silent = 0.0;
     double followed = 0.0;
     double least_ratio = 1e9;
+    double least_of_innovation = 1e9;
     double count = 0.0;
     for (const auto& run : all) {
+      // What a filter can know of a wrong fix is how far it is from where the filter was. The dead
+      // reckoning of 211 s has an error of its own, which may point towards the cluster.
+      const Eigen::Vector2d before_m = sample_at(run[filter], kCluster_s - 0.1).error_m.head<2>();
       for (const DriveSample& sample : run[filter]) {
         const double t_s = sample.time_s - kCluster_s;
         if (t_s < 0.0 || t_s > 24.0) {
           continue;
         }
         count += 1.0;
-        if (sample.error_m.norm() > 350.0) {  // nearer to the cluster than to the truth
+        const Eigen::Vector2d error_m = sample.error_m.head<2>();
+        if (error_m.norm() > 350.0) {  // nearer to the cluster than to the truth
+          const double sigma_m = sample.sigma_m.head<2>().norm();
           followed += 1.0;
           silent += sample.health == GpsHealth::kOk;
-          least_ratio =
-              std::min(least_ratio, sample.sigma_m.head<2>().norm() / sample.error_m.norm());
+          least_ratio = std::min(least_ratio, sigma_m / error_m.norm());
+          least_of_innovation =
+              std::min(least_of_innovation, sigma_m / (error_m - before_m).norm());
         }
       }
     }
@@ -281,7 +288,9 @@ TEST(Fault, cluster_after_a_blackout_is_never_followed_in_silence) {
     } else {
       table().at_most("700 m cluster, followed with health OK", name, silent / count, 0.0, "");
       if (followed > 0.0) {
-        table().at_least("700 m cluster, sigma / error while followed", name, least_ratio, 0.5, "");
+        table().at_least(
+            "700 m cluster, sigma / innovation while followed", name, least_of_innovation, 1.0, "");
+        table().note("700 m cluster, sigma / error while followed", name, least_ratio, "");
       }
     }
   }

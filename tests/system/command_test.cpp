@@ -94,6 +94,7 @@ TEST(Command, every_verb_has_help) {
                            "evaluate",
                            "report",
                            "export",
+                           "gps-plots",
                            "config",
                            "doctor"}) {
     const CommandResult result = trigpoint({verb, "--help"});
@@ -249,6 +250,9 @@ TEST(Command, a_wrong_number_is_a_usage_error_and_leaves_nothing) {
                                                     {"map", "short", "--mode", "nonsense"},
                                                     {"simulate", "short", "--duration", "1e9"},
                                                     {"simulate", "shrt"},
+                                                    {"gps-plots", "--outage", "-1"},
+                                                    {"gps-plots", "--outage", "1e9"},
+                                                    {"gps-plots", "--scenario", "shrt"},
                                                     {"record", "--duration", "-1"}};
   for (std::vector<std::string> arguments : wrong) {
     arguments.insert(arguments.end(), {"--out", folder.path("s")});
@@ -409,6 +413,35 @@ TEST(Command, evaluate_tells_a_known_offset) {
   EXPECT_EQ(result.exit_code, 0) << result.output;
   EXPECT_THAT(result.output,
               AllOf(HasSubstr("50 pairs"), HasSubstr("3.000"), HasSubstr("coverage 100.0 %")));
+}
+
+TEST(Command, gps_plots_makes_a_page_of_the_three_filters_and_never_over_another) {
+  if (run_command({"gnuplot", "--version"}, 10s, {}).exit_code != 0) {
+    GTEST_SKIP() << "gnuplot is not installed: pictures are not tested";
+  }
+  const TemporaryFolder folder;
+  const std::vector<std::string> arguments{"gps-plots",
+                                           "--outage-from",
+                                           "40",
+                                           "--outage",
+                                           "5",
+                                           "--around",
+                                           "5",
+                                           "--out",
+                                           folder.path("p")};
+  const CommandResult result = trigpoint(arguments);
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+  EXPECT_THAT(result.output, HasSubstr(folder.path("p/index.html")));
+  for (const char* file : {"bands.png",
+                           "all.png",
+                           "plots/bands_ekf15.dat",
+                           "plots/bands_eskf18.dat",
+                           "plots/bands_ekf15_strict.dat"}) {
+    EXPECT_TRUE(fs::exists(folder.path(std::string("p/") + file))) << file;
+  }
+  const CommandResult again = trigpoint(arguments);
+  EXPECT_EQ(again.exit_code, 2);
+  EXPECT_THAT(again.output, HasSubstr("index.html already"));
 }
 
 TEST(Command, record_hears_what_play_says) {

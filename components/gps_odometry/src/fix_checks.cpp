@@ -84,9 +84,19 @@ Repair repair_covariance(const GnssFix& fix, const Config& config) {
                      "positive one; the default of its class is used.",
                      reported.diagonal().minCoeff())};
   }
+  if (reported(2, 2) > kHugeVariance_m2) {
+    // The height is not known, its position is: larger numbers would drown that in rounding.
+    const Vector3d bounded = reported.diagonal().cwiseMin(kHugeVariance_m2);
+    return {bounded.asDiagonal(),
+            false,
+            "used_with_diagonal_covariance",
+            sentence("The fix's vertical variance is %g m^2, expected at most 1e6; that is used, "
+                     "without correlations.",
+                     reported(2, 2))};
+  }
   const double least =
       Eigen::SelfAdjointEigenSolver<Matrix3d>(reported, Eigen::EigenvaluesOnly).eigenvalues()(0);
-  if (least <= 0.0) {
+  if (!(least > 0.0)) {
     return {reported.diagonal().asDiagonal(),
             false,
             "used_with_diagonal_covariance",

@@ -388,7 +388,8 @@ bool InsTracker::was_unproven(InsTrack& track,
   if (distance2(judgement.innovation_m, S, part) > gate_[part]) {
     return false;
   }
-  const auto [first, count] = kSpans[part];
+  const int first = kSpans[part].first;  // clang 14 captures no structured bindings
+  const int count = kSpans[part].count;
   for_each(track, [&](Eskf18& filter) {
     for (int i = first; i < first + count; ++i) {
       filter.P(ins::kPosition + i, ins::kPosition + i) += held_m2(i);
@@ -420,7 +421,8 @@ void InsTracker::absorb(InsTrack& track,
 
 /// The filter was wrong: the position is free to follow the fix.
 void InsTracker::recover(InsTrack& track, const MapFix& fix, Part part) const {
-  const auto [first, count] = kSpans[part];
+  const int first = kSpans[part].first;  // clang 14 captures no structured bindings
+  const int count = kSpans[part].count;
   const bool lost = track.parts[part].filter_is_suspect && part == kHorizontal;
   const Vector3d apart = fix.antenna_map_m - antenna(track.filter, lever_base_m_);
   for_each(track, [&](Eskf18& filter) {

@@ -30,9 +30,14 @@ constexpr double kLeastTilt_rad = 0.02;
 constexpr double kLeastYaw_rad = 0.2;
 constexpr double kLeastSpeed_mps = 0.1;
 // An odometry that is less certain than this is no better than the next fix.
-constexpr double kMostYaw_rad = 0.6;
+constexpr double kMostRotation_rad = 0.6;
 constexpr double kMostSpeed_mps = 5.0;
 constexpr double kMostPosition_m = 100.0;
+// Finite is not enough: beyond these, rounding alone makes a covariance indefinite.
+constexpr double kNotUnit = 0.05;
+constexpr double kFarthest_m = 1e6;
+constexpr double kFastest_mps = 350.0;
+constexpr double kFastestTurn_radps = 35.0;  // as of the IMU
 
 bool is_positive(const Matrix3d& covariance) {
   return covariance.allFinite() && covariance.diagonal().minCoeff() > 0.0 &&
@@ -73,10 +78,20 @@ std::optional<std::string> find_warm_start_fault(const Odometry& odometry,
       !is_positive(velocity)) {
     return "it is not finite, or a covariance is not positive";
   }
-  if (std::sqrt(rotation(2, 2)) > kMostYaw_rad || largest_sigma(velocity) > kMostSpeed_mps ||
+  if (!(std::abs(odometry.T_frame_child.q.norm() - 1.0) < kNotUnit)) {
+    return "its quaternion's norm is " + std::to_string(odometry.T_frame_child.q.norm()) +
+           ", expected 1";
+  }
+  if (odometry.T_frame_child.p.norm() > kFarthest_m || odometry.linear_mps.norm() > kFastest_mps ||
+      odometry.angular_radps.norm() > kFastestTurn_radps) {
+    return "it is " + std::to_string(odometry.T_frame_child.p.norm() * 1e-3) +
+           " km from the datum, at " + std::to_string(odometry.linear_mps.norm()) + " m/s and " +
+           std::to_string(odometry.angular_radps.norm()) + " rad/s";
+  }
+  if (largest_sigma(rotation) > kMostRotation_rad || largest_sigma(velocity) > kMostSpeed_mps ||
       largest_sigma(position) > kMostPosition_m) {
     return "its sigmas are " + std::to_string(largest_sigma(position)) + " m, " +
-           std::to_string(std::sqrt(rotation(2, 2))) + " rad of yaw and " +
+           std::to_string(largest_sigma(rotation)) + " rad and " +
            std::to_string(largest_sigma(velocity)) + " m/s";
   }
   return std::nullopt;

@@ -106,6 +106,21 @@ TEST(FixChecks, uses_only_the_diagonal_of_a_covariance_that_is_none) {
   EXPECT_EQ(verdict.fix->covariance_enu_m2(0, 1), 0.0);
 }
 
+TEST(FixChecks, bounds_a_vertical_variance_without_bound) {
+  for (const double variance_m2 : {1.1e6, 1e300, 1.7e308}) {
+    GnssFix fix = good_fix();
+    fix.covariance_enu_m2(2, 2) = variance_m2;
+    fix.covariance_enu_m2(0, 2) = fix.covariance_enu_m2(2, 0) = 0.1;
+    const FixVerdict verdict = check_fix(fix, kConfig);
+    ASSERT_TRUE(verdict.fix.has_value());
+    EXPECT_EQ(verdict.reason, "used_with_diagonal_covariance");
+    EXPECT_NEAR(verdict.fix->covariance_enu_m2(2, 2),
+                kConfig.fix_sigma_scale * kConfig.fix_sigma_scale * 1e6,
+                1.0);
+    EXPECT_EQ(verdict.fix->covariance_enu_m2(0, 2), 0.0);
+  }
+}
+
 TEST(FixChecks, tells_fixed_from_float_from_code_by_the_covariance) {
   const auto class_at = [](double sigma_m, FixStatus status) {
     GnssFix fix = fix_at({1.0, 2.0, 3.0}, 1.0, sigma_m);

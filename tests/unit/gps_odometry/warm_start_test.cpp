@@ -7,6 +7,7 @@
 
 #include "driven.hpp"
 #include "ins_tracker.hpp"
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -237,8 +238,25 @@ TEST(WarmStartFault, is_found_in_frame_datum_covariance_and_heading) {
   EXPECT_NE(fault([](Odometry&) {}, ""), "");
   EXPECT_NE(fault([](Odometry& o) { o.pose_covariance(1, 1) = 0.0; }), "");
   EXPECT_NE(fault([](Odometry& o) { o.pose_covariance(5, 5) = 1e6; }), "");
+  EXPECT_NE(fault([](Odometry& o) { o.pose_covariance(3, 3) = 1e300; }), "");
   EXPECT_NE(fault([](Odometry& o) { o.twist_covariance *= 1e9; }), "");
   EXPECT_NE(fault([](Odometry& o) { o.T_frame_child.p.x() = kNaN; }), "");
+}
+
+TEST(WarmStartFault, is_found_in_what_is_finite_but_impossible) {
+  const auto fault = [](const std::function<void(Odometry&)>& change) {
+    Odometry odometry = good_odometry();
+    change(odometry);
+    return find_warm_start_fault(odometry, "here", "here").value_or("");
+  };
+  EXPECT_THAT(fault([](Odometry& o) { o.T_frame_child.p.z() = -1e300; }),
+              ::testing::HasSubstr("km"));
+  EXPECT_THAT(fault([](Odometry& o) { o.linear_mps.x() = 1e9; }), ::testing::HasSubstr("m/s"));
+  EXPECT_THAT(fault([](Odometry& o) { o.angular_radps.z() = 1e9; }), ::testing::HasSubstr("rad/s"));
+  EXPECT_THAT(fault([](Odometry& o) { o.T_frame_child.q.coeffs().setZero(); }),
+              ::testing::HasSubstr("norm"));
+  EXPECT_THAT(fault([](Odometry& o) { o.T_frame_child.q.w() = 1e300; }),
+              ::testing::HasSubstr("norm"));
 }
 
 TEST(WarmStartCarry, follows_the_circle_of_its_twist_and_grows_with_age) {
