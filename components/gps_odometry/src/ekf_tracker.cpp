@@ -5,6 +5,7 @@
 #include "trigpoint/base/so3.hpp"
 
 #include "chi_square.hpp"
+#include "gravity.hpp"
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
@@ -28,7 +29,28 @@ constexpr double kAligningSpeedSigma_mps = 1.0;
 constexpr double kGyroBiasGrowth = 3.3;
 constexpr double kAccelBiasGrowth = 3.0;
 constexpr double kIgnoredHeight_m2 = 1e8;
-constexpr double kSteep_rad = 1.4;  // roll pitch yaw become singular at pitch 90 degrees
+constexpr double kRestSpeed_mps = 0.3;
+constexpr double kRestRate_radps = 0.03;
+constexpr double kMostUpBias_mps2 = 0.3;
+constexpr double kDoubtHold_s = 30.0;
+constexpr double kDoubtDecay_s = 5.0;  // after that
+constexpr double kBetterClassDecay_s = 20.0;
+constexpr double kWrongFix_m = 0.5;      // wrong ambiguities: 15 % of re-fixes, 0.4 to 1.6 m
+constexpr double kReadmission_m = 10.0;  // step after an outage that is doubted
+constexpr double kOutage_s = 3.0;        // without fixes, after which the receiver is another one
+constexpr int kContradictions = 2;       // refused fixes that are more than a spike
+constexpr double kSteep_rad = 1.4;       // roll pitch yaw become singular at pitch 90 degrees
+
+/// What is left of the doubt at the track's time: 1 while it is held.
+double doubt_left(const EkfTrack& track) {
+  const double over_s = std::max(0.0, to_seconds(track.stamp_ns - track.doubt_until_ns));
+  return std::exp(-over_s / kDoubtDecay_s);
+}
+
+void raise_doubt(EkfTrack& track, const Vector3d& step_m, Nanoseconds stamp_ns) {
+  track.doubt_m2 = (doubt_left(track) * track.doubt_m2).cwiseMax(step_m.cwiseAbs2());
+  track.doubt_until_ns = stamp_ns + from_seconds(kDoubtHold_s);
+}
 
 }  // namespace
 
@@ -74,6 +96,17 @@ MotionNoise EkfTracker::noise(const EkfTrack& track) const {
   return noise;
 }
 
+/// At rest the accelerometer measures gravity: what it measures too much would be taken for a
+/// climb. Of the other axes it would tell tilt and bias together.
+void EkfTracker::learn_at_rest(EkfTrack& track, const QuietWindow& quiet) const {
+  const bool is_slow = track.accepted_ns == 0 || speed_mps(track) < kRestSpeed_mps;
+  const double up_mps2 = quiet.mean_accel_mps2.norm() - kGravity_mps2;
+  if (is_slow && quiet.mean_gyro_radps.norm() < kRestRate_radps &&
+      std::abs(up_mps2) < kMostUpBias_mps2) {
+    track.up_bias_mps2 = up_mps2;
+  }
+}
+
 void EkfTracker::advance(EkfTrack& track, Nanoseconds stamp_ns) const {
   predict(
       track.filter, to_seconds(stamp_ns - track.stamp_ns), config_.longest_step_s, noise(track));
@@ -91,9 +124,12 @@ void EkfTracker::apply(EkfTrack& track, const CheckedImu& imu) const {
       track.filter.P.block<3, 3>(kAttitude, kAttitude).diagonal().array() +=
           gap_s * kTiltSigma_rad * kTiltSigma_rad;
     }
+    if (imu.quiet) {
+      learn_at_rest(track, *imu.quiet);
+    }
     update_imu(track.filter,
                imu.gyro_radps,
-               imu.accel_mps2,
+               imu.accel_mps2 - track.up_bias_mps2 * imu.mean_accel_mps2.normalized(),
                config_.gyro_sigma_radps,
                config_.accel_sigma_mps2);
   }
@@ -113,6 +149,9 @@ FixOutcome EkfTracker::apply(EkfTrack& track, const MapFix& fix) const {
   const bool lost =
       track.phase == Phase::kRunning && (yaw_sigma_rad(track) > config_.heading_lost_rad ||
                                          (is_unconfirmed(track) && contradicts(track, fix)));
+  if (track.phase == Phase::kRunning) {
+    doubt_step(track, fix);
+  }
   if (lost) {
     track.phase = Phase::kAligning;
     track.heading.restart();
@@ -245,6 +284,9 @@ FixOutcome EkfTracker::filter_fix(EkfTrack& track, const MapFix& fix) const {
                       ", expected at most " + std::to_string(gate2_) + " (2 degrees of freedom).");
   }
   FixOutcome outcome{true, "", ""};
+  if (track.refused.count >= kContradictions) {
+    readmit(track, fix, innovation);
+  }
   Matrix3d R = fix.covariance_map_m2;
   if (innovation.z() * innovation.z() > gate1_ * S(2, 2)) {
     outcome = {true,
@@ -286,6 +328,28 @@ FixOutcome EkfTracker::refuse(EkfTrack& track,
   return {false, reason, "Fix refused: " + text};
 }
 
+/// A large step after an outage may be the filter's drift or the receiver's error.
+void EkfTracker::doubt_step(EkfTrack& track, const MapFix& fix) const {
+  const double age_s = to_seconds(fix.checked.stamp_ns - track.accepted_ns);
+  const Vector3d step = fix.antenna_map_m - expected_antenna(track.filter.x, lever_base_m_);
+  const double least_m =
+      kReadmission_m + 3.0 * std::sqrt(fix.covariance_map_m2.diagonal().maxCoeff());
+  if (age_s > kOutage_s && step.norm() > least_m) {
+    raise_doubt(track, step, fix.checked.stamp_ns);
+  }
+}
+
+/// Fixes were refused until the filter's sigma had grown enough to let them pass. That proves
+/// nothing: the step is announced and doubted, and tells nothing of the velocity.
+void EkfTracker::readmit(EkfTrack& track, const MapFix& fix, const Vector3d& innovation_m) const {
+  track.filter.x.segment<3>(kPosition) += innovation_m;
+  reset_block(track.filter, kPosition, fix.covariance_map_m2);
+  raise_doubt(track, innovation_m, fix.checked.stamp_ns);
+  ++track.reset.counter;
+  track.reset.delta = {0.0, innovation_m};
+  track.reset_ns = fix.checked.stamp_ns;
+}
+
 void EkfTracker::recover(EkfTrack& track, const MapFix& fix) const {
   const Vector3d before = pose(track).p;
   if (track.phase == Phase::kRunning) {
@@ -298,8 +362,8 @@ void EkfTracker::recover(EkfTrack& track, const MapFix& fix) const {
     reset_block(filter, kVelocity, P_velocity);
     // A position that had to be set may have been lost because of the heading.
     filter.P(kAttitude + 2, kAttitude + 2) += 0.25;
-    // Who was right is open: the published sigma remembers half of the disagreement for a while.
-    track.correlated_m2 = track.correlated_m2.cwiseMax(0.25 * innovation.cwiseAbs2());
+    // Who was right is open: the published sigma remembers the disagreement for a while.
+    raise_doubt(track, innovation, fix.checked.stamp_ns);
   } else {
     track.heading.restart();
   }
@@ -322,7 +386,7 @@ void EkfTracker::recover_height(EkfTrack& track, const MapFix& fix) const {
     filter.P(i, i) = variance;
   }
   filter.x(kPosition + 2) += innovation;
-  track.correlated_m2.z() = std::max(track.correlated_m2.z(), 0.25 * innovation * innovation);
+  raise_doubt(track, {0.0, 0.0, innovation}, fix.checked.stamp_ns);
   track.refused_height = RefusedStreak{};
   ++track.recoveries;
   ++track.reset.counter;
@@ -337,10 +401,27 @@ void EkfTracker::hold_correlated(EkfTrack& track, const MapFix& fix, double elap
   track.correlated_m2 = now.cwiseMax(keep * track.correlated_m2 + (1.0 - keep) * now);
 }
 
+void EkfTracker::hold_reported(EkfTrack& track, const MapFix& fix, double elapsed_s) const {
+  const Vector3d now = fix.covariance_map_m2.diagonal();
+  const double keep = std::exp(-std::clamp(elapsed_s, 0.0, 60.0) / kBetterClassDecay_s);
+  track.held_m2 = now.cwiseMax(keep * track.held_m2 + (1.0 - keep) * now);
+  if (elapsed_s > kOutage_s && track.phase == Phase::kRunning) {
+    track.held_m2 = track.held_m2.cwiseMax(Vector3d::Constant(kWrongFix_m * kWrongFix_m));
+  }
+  track.fix_m2 = now;
+}
+
+/// What the filter cannot know of its own error.
+Vector3d EkfTracker::added_variance_m2(const EkfTrack& track) const {
+  return track.correlated_m2 + (track.held_m2 - track.fix_m2).cwiseMax(0.0) +
+         doubt_left(track) * track.doubt_m2 + floor_variance_m2(track, config_);
+}
+
 void EkfTracker::accept(EkfTrack& track, const MapFix& fix) const {
   const double elapsed_s =
       track.accepted_ns > 0 ? to_seconds(fix.checked.stamp_ns - track.accepted_ns) : 0.0;
   hold_correlated(track, fix, elapsed_s);
+  hold_reported(track, fix, elapsed_s);
   note_accepted(track, fix);
   if (track.phase == Phase::kRunning) {
     const auto H = antenna_jacobian(track.filter.x, lever_base_m_);
@@ -350,8 +431,7 @@ void EkfTracker::accept(EkfTrack& track, const MapFix& fix) const {
     track.accepted_antenna_map_m = fix.antenna_map_m;
     track.accepted_covariance_map_m2 = fix.covariance_map_m2;
   }
-  track.accepted_covariance_map_m2.diagonal() +=
-      track.correlated_m2 + floor_variance_m2(track, config_);
+  track.accepted_covariance_map_m2.diagonal() += added_variance_m2(track);
 }
 
 // ---- what is published --------------------------------------------------------------------------
@@ -374,7 +454,7 @@ PoseCovariance EkfTracker::pose_covariance(const EkfTrack& track) const {
   J.bottomRightCorner<3, 3>() = track.filter.R_map_base() * body_from_euler_rates(rpy);
   PoseCovariance covariance = J * track.filter.P.topLeftCorner<6, 6>() * J.transpose();
   if (track.phase == Phase::kRunning) {
-    covariance.diagonal().head<3>() += track.correlated_m2 + floor_variance_m2(track, config_);
+    covariance.diagonal().head<3>() += added_variance_m2(track);
     return 0.5 * (covariance + covariance.transpose());
   }
   PoseCovariance aligning = PoseCovariance::Zero();
@@ -416,7 +496,8 @@ Estimate EkfTracker::estimate(const EkfTrack& track) const {
 }
 
 bool EkfTracker::is_doubtful(const EkfTrack& track) const {
-  return std::abs(track.filter.x(kAttitude + 1)) > kSteep_rad;
+  return std::abs(track.filter.x(kAttitude + 1)) > kSteep_rad ||
+         track.stamp_ns < track.doubt_until_ns;
 }
 
 void EkfTracker::change_frame(EkfTrack& track,
