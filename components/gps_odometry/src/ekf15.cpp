@@ -52,7 +52,8 @@ Vector15d noise_rates(const MotionNoise& noise, double dt_s) {
   Vector15d q = Vector15d::Zero();
   const auto square = [](double value) { return value * value; };
   q.segment<3>(kAttitude).setConstant(square(noise.attitude_rad_sqrts));
-  q.segment<3>(kVelocity).setConstant(square(noise.velocity_mps_sqrts));
+  q.segment<2>(kVelocity).setConstant(square(noise.velocity_mps_sqrts));
+  q(kVelocity + 2) = square(noise.velocity_up_mps_sqrts);
   q.segment<3>(kRate).setConstant(square(noise.rate_radps_sqrts));
   // First-order Gauss-Markov, exact for the step: sigma^2 (1 - exp(-2 dt / tau)) ([2] 8.2.3).
   const double grown = -std::expm1(-2.0 * dt_s / noise.acceleration_tau_s);

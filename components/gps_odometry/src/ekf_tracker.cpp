@@ -32,6 +32,8 @@ constexpr double kIgnoredHeight_m2 = 1e8;
 constexpr double kRestSpeed_mps = 0.3;
 constexpr double kRestRate_radps = 0.03;
 constexpr double kMostUpBias_mps2 = 0.3;
+constexpr double kUpBiasLeft = 0.4;  // share of the bias that one look at rest leaves
+constexpr double kMostDoubt_m2 = kUnknownVariance;
 constexpr double kDoubtHold_s = 30.0;
 constexpr double kDoubtDecay_s = 5.0;  // after that
 constexpr double kBetterClassDecay_s = 20.0;
@@ -48,7 +50,8 @@ double doubt_left(const EkfTrack& track) {
 }
 
 void raise_doubt(EkfTrack& track, const Vector3d& step_m, Nanoseconds stamp_ns) {
-  track.doubt_m2 = (doubt_left(track) * track.doubt_m2).cwiseMax(step_m.cwiseAbs2());
+  track.doubt_m2 =
+      (doubt_left(track) * track.doubt_m2).cwiseMax(step_m.cwiseAbs2()).cwiseMin(kMostDoubt_m2);
   track.doubt_until_ns = stamp_ns + from_seconds(kDoubtHold_s);
 }
 
@@ -90,6 +93,8 @@ MotionNoise EkfTracker::noise(const EkfTrack& track) const {
   noise.attitude_rad_sqrts = std::hypot(config_.attitude_noise_rad_sqrts,
                                         track.gyro_bias_sigma_radps * std::sqrt(gyro_horizon_s));
   noise.velocity_mps_sqrts = config_.accel_bias_sigma_mps2 * std::sqrt(accel_horizon_s);
+  const double up_share = track.up_bias_mps2 == 0.0 ? 1.0 : kUpBiasLeft;
+  noise.velocity_up_mps_sqrts = up_share * noise.velocity_mps_sqrts;
   noise.rate_radps_sqrts = config_.rate_noise_radps_sqrts;
   noise.acceleration_sigma_mps2 = config_.acceleration_sigma_mps2;
   noise.acceleration_tau_s = config_.acceleration_tau_s;

@@ -45,7 +45,7 @@ Eigen::Matrix<double, M, 15> numerical_jacobian(const Vector15d& x, const Functi
 }
 
 MotionNoise some_noise() {
-  return {0.01, 0.1, 1.0, 1.5, kTau_s};
+  return {0.01, 0.1, 0.1, 1.0, 1.5, kTau_s};
 }
 
 TEST(Ekf15, has_the_jacobian_of_its_motion_model) {
