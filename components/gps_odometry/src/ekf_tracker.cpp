@@ -339,7 +339,8 @@ void EkfTracker::doubt_step(EkfTrack& track, const MapFix& fix) const {
   const Vector3d step = fix.antenna_map_m - expected_antenna(track.filter.x, lever_base_m_);
   const double least_m =
       kReadmission_m + 3.0 * std::sqrt(fix.covariance_map_m2.diagonal().maxCoeff());
-  if (age_s > kOutage_s && step.norm() > least_m) {
+  // Before the first accepted fix nothing but another filter's word is contradicted.
+  if (track.accepted_ns > 0 && age_s > kOutage_s && step.norm() > least_m) {
     raise_doubt(track, step, fix.checked.stamp_ns);
   }
 }
