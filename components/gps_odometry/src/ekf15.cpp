@@ -64,10 +64,10 @@ Vector15d noise_rates(const MotionNoise& noise, double dt_s) {
 void predict_step(Ekf15& filter, double dt_s, const MotionNoise& noise) {
   const Matrix15d F = propagation_jacobian(filter.x, dt_s, noise.acceleration_tau_s);
   const Vector15d q = noise_rates(noise, dt_s);
-  // The integral of Phi q Phi^T over the step by Simpson's rule, exact where the integrand is a cubic
-  // in time: unlike dt * q on the diagonal it does not depend on how the time is cut. The trapezoid
-  // rule is not enough: of a random walk of the rates it makes the angle's variance q dt^3 / 2
-  // instead of q dt^3 / 3, and once a gyro sample has told the rate, q dt^3 / 4 instead of
+  // The integral of Phi q Phi^T over the step by Simpson's rule, exact where the integrand is a
+  // cubic in time: unlike dt * q on the diagonal it does not depend on how the time is cut. The
+  // trapezoid rule is not enough: of a random walk of the rates it makes the angle's variance q
+  // dt^3 / 2 instead of q dt^3 / 3, and once a gyro sample has told the rate, q dt^3 / 4 instead of
   // q dt^3 / 12 are left.
   const Matrix15d half = propagation_jacobian(filter.x, 0.5 * dt_s, noise.acceleration_tau_s);
   Matrix15d Q = F * q.asDiagonal() * F.transpose();

@@ -5,7 +5,6 @@
 #include "trigpoint/base/so3.hpp"
 
 #include "chi_square.hpp"
-#include "gravity.hpp"
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
@@ -29,31 +28,10 @@ constexpr double kAligningSpeedSigma_mps = 1.0;
 constexpr double kGyroBiasGrowth = 3.3;
 constexpr double kAccelBiasGrowth = 3.0;
 constexpr double kIgnoredHeight_m2 = 1e8;
-constexpr double kRestSpeed_mps = 0.3;
-constexpr double kRestRate_radps = 0.03;
-constexpr double kMostUpBias_mps2 = 0.3;
-constexpr double kUpBiasLeft = 0.4;  // share of the bias that one look at rest leaves
-constexpr double kMostDoubt_m2 = kUnknownVariance;
-constexpr double kDoubtHold_s = 30.0;
-constexpr double kDoubtDecay_s = 5.0;  // after that
-constexpr double kBetterClassDecay_s = 20.0;
-constexpr double kWrongFix_m = 0.5;      // wrong ambiguities: 15 % of re-fixes, 0.4 to 1.6 m
-constexpr double kReadmission_m = 10.0;  // step after an outage that is doubted
-constexpr double kOutage_s = 3.0;        // without fixes, after which the receiver is another one
-constexpr int kContradictions = 2;       // refused fixes that are more than a spike
-constexpr double kSteep_rad = 1.4;       // roll pitch yaw become singular at pitch 90 degrees
-
-/// What is left of the doubt at the track's time: 1 while it is held.
-double doubt_left(const EkfTrack& track) {
-  const double over_s = std::max(0.0, to_seconds(track.stamp_ns - track.doubt_until_ns));
-  return std::exp(-over_s / kDoubtDecay_s);
-}
-
-void raise_doubt(EkfTrack& track, const Vector3d& step_m, Nanoseconds stamp_ns) {
-  track.doubt_m2 =
-      (doubt_left(track) * track.doubt_m2).cwiseMax(step_m.cwiseAbs2()).cwiseMin(kMostDoubt_m2);
-  track.doubt_until_ns = stamp_ns + from_seconds(kDoubtHold_s);
-}
+// Share of the accelerometer's error along z that is left once it was seen at rest: on a slope of
+// 10 degrees the horizontal errors add 17 %, and it wanders by a third until the next rest.
+constexpr double kUpErrorLeft = 0.4;
+constexpr double kSteep_rad = 1.4;  // roll pitch yaw become singular at pitch 90 degrees
 
 }  // namespace
 
@@ -93,23 +71,12 @@ MotionNoise EkfTracker::noise(const EkfTrack& track) const {
   noise.attitude_rad_sqrts = std::hypot(config_.attitude_noise_rad_sqrts,
                                         track.gyro_bias_sigma_radps * std::sqrt(gyro_horizon_s));
   noise.velocity_mps_sqrts = config_.accel_bias_sigma_mps2 * std::sqrt(accel_horizon_s);
-  const double up_share = track.up_bias_mps2 == 0.0 ? 1.0 : kUpBiasLeft;
+  const double up_share = track.knows_up_error ? kUpErrorLeft : 1.0;
   noise.velocity_up_mps_sqrts = up_share * noise.velocity_mps_sqrts;
   noise.rate_radps_sqrts = config_.rate_noise_radps_sqrts;
   noise.acceleration_sigma_mps2 = config_.acceleration_sigma_mps2;
   noise.acceleration_tau_s = config_.acceleration_tau_s;
   return noise;
-}
-
-/// At rest the accelerometer measures gravity: what it measures too much would be taken for a
-/// climb. Of the other axes it would tell tilt and bias together.
-void EkfTracker::learn_at_rest(EkfTrack& track, const QuietWindow& quiet) const {
-  const bool is_slow = track.accepted_ns == 0 || speed_mps(track) < kRestSpeed_mps;
-  const double up_mps2 = quiet.mean_accel_mps2.norm() - kGravity_mps2;
-  if (is_slow && quiet.mean_gyro_radps.norm() < kRestRate_radps &&
-      std::abs(up_mps2) < kMostUpBias_mps2) {
-    track.up_bias_mps2 = up_mps2;
-  }
 }
 
 void EkfTracker::advance(EkfTrack& track, Nanoseconds stamp_ns) const {
@@ -134,7 +101,7 @@ void EkfTracker::apply(EkfTrack& track, const CheckedImu& imu) const {
     }
     update_imu(track.filter,
                imu.gyro_radps,
-               imu.accel_mps2 - track.up_bias_mps2 * imu.mean_accel_mps2.normalized(),
+               imu.accel_mps2 - track.up_error_mps2 * imu.mean_accel_mps2.normalized(),
                config_.gyro_sigma_radps,
                config_.accel_sigma_mps2);
   }
@@ -289,9 +256,7 @@ FixOutcome EkfTracker::filter_fix(EkfTrack& track, const MapFix& fix) const {
                       ", expected at most " + std::to_string(gate2_) + " (2 degrees of freedom).");
   }
   FixOutcome outcome{true, "", ""};
-  if (track.refused.count >= kContradictions) {
-    readmit(track, fix, innovation);
-  }
+  const bool follows = follows_refused(track, innovation);
   Matrix3d R = fix.covariance_map_m2;
   if (innovation.z() * innovation.z() > gate1_ * S(2, 2)) {
     outcome = {true,
@@ -310,7 +275,11 @@ FixOutcome EkfTracker::filter_fix(EkfTrack& track, const MapFix& fix) const {
   } else {
     track.refused_height = RefusedStreak{};
   }
-  update_antenna(filter, fix.antenna_map_m, R, lever_base_m_);
+  if (follows) {
+    readmit(track, fix, outcome.reason.empty());
+  } else {
+    update_antenna(filter, fix.antenna_map_m, R, lever_base_m_);
+  }
   accept(track, fix);
   return outcome;
 }
@@ -320,6 +289,7 @@ FixOutcome EkfTracker::refuse(EkfTrack& track,
                               const std::string& reason,
                               const std::string& text) const {
   extend(track.refused, fix, config_.highest_speed_mps);
+  track.refused_innovation_m = fix.antenna_map_m - expected_antenna(track.filter.x, lever_base_m_);
   if (is_believed(track.refused, config_.recovery_s)) {
     recover(track, fix);
     return {true,
@@ -331,96 +301,6 @@ FixOutcome EkfTracker::refuse(EkfTrack& track,
   track.refused_ns = fix.checked.stamp_ns;
   ++(reason == "gate" ? track.refused_gate : track.refused_teleport);
   return {false, reason, "Fix refused: " + text};
-}
-
-/// A large step after an outage may be the filter's drift or the receiver's error.
-void EkfTracker::doubt_step(EkfTrack& track, const MapFix& fix) const {
-  const double age_s = to_seconds(fix.checked.stamp_ns - track.accepted_ns);
-  const Vector3d step = fix.antenna_map_m - expected_antenna(track.filter.x, lever_base_m_);
-  const double least_m =
-      kReadmission_m + 3.0 * std::sqrt(fix.covariance_map_m2.diagonal().maxCoeff());
-  // Before the first accepted fix nothing but another filter's word is contradicted.
-  if (track.accepted_ns > 0 && age_s > kOutage_s && step.norm() > least_m) {
-    raise_doubt(track, step, fix.checked.stamp_ns);
-  }
-}
-
-/// Fixes were refused until the filter's sigma had grown enough to let them pass. That proves
-/// nothing: the step is announced and doubted, and tells nothing of the velocity.
-void EkfTracker::readmit(EkfTrack& track, const MapFix& fix, const Vector3d& innovation_m) const {
-  track.filter.x.segment<3>(kPosition) += innovation_m;
-  reset_block(track.filter, kPosition, fix.covariance_map_m2);
-  raise_doubt(track, innovation_m, fix.checked.stamp_ns);
-  ++track.reset.counter;
-  track.reset.delta = {0.0, innovation_m};
-  track.reset_ns = fix.checked.stamp_ns;
-}
-
-void EkfTracker::recover(EkfTrack& track, const MapFix& fix) const {
-  const Vector3d before = pose(track).p;
-  if (track.phase == Phase::kRunning) {
-    Ekf15& filter = track.filter;
-    const Vector3d innovation = fix.antenna_map_m - expected_antenna(filter.x, lever_base_m_);
-    filter.x.segment<3>(kPosition) += innovation;
-    reset_block(filter, kPosition, fix.covariance_map_m2);
-    const Matrix3d P_velocity =
-        filter.P.block<3, 3>(kVelocity, kVelocity) + Matrix3d::Identity() * 4.0;
-    reset_block(filter, kVelocity, P_velocity);
-    // A position that had to be set may have been lost because of the heading.
-    filter.P(kAttitude + 2, kAttitude + 2) += 0.25;
-    // Who was right is open: the published sigma remembers the disagreement for a while.
-    raise_doubt(track, innovation, fix.checked.stamp_ns);
-  } else {
-    track.heading.restart();
-  }
-  ++track.recoveries;
-  track.refused_height = RefusedStreak{};
-  track.accepted_ns = fix.checked.stamp_ns;  // what was just raised must not decay at once
-  accept(track, fix);
-  ++track.reset.counter;
-  track.reset.delta = {0.0, pose(track).p - before};
-  track.reset_ns = fix.checked.stamp_ns;
-}
-
-void EkfTracker::recover_height(EkfTrack& track, const MapFix& fix) const {
-  Ekf15& filter = track.filter;
-  const double innovation = fix.antenna_map_m.z() - expected_antenna(filter.x, lever_base_m_).z();
-  for (const int i : {kPosition + 2, kVelocity + 2}) {
-    const double variance = i == kPosition + 2 ? fix.covariance_map_m2(2, 2) : filter.P(i, i) + 1.0;
-    filter.P.row(i).setZero();
-    filter.P.col(i).setZero();
-    filter.P(i, i) = variance;
-  }
-  filter.x(kPosition + 2) += innovation;
-  raise_doubt(track, {0.0, 0.0, innovation}, fix.checked.stamp_ns);
-  track.refused_height = RefusedStreak{};
-  ++track.recoveries;
-  ++track.reset.counter;
-  track.reset.delta = {0.0, Vector3d(0.0, 0.0, innovation)};
-  track.reset_ns = fix.checked.stamp_ns;
-}
-
-/// Peak hold: rises at once, falls with the decay time.
-void EkfTracker::hold_correlated(EkfTrack& track, const MapFix& fix, double elapsed_s) const {
-  const Vector3d now = config_.fix_correlated_share * fix.covariance_map_m2.diagonal();
-  const double keep = std::exp(-std::clamp(elapsed_s, 0.0, 60.0) / config_.correlated_decay_s);
-  track.correlated_m2 = now.cwiseMax(keep * track.correlated_m2 + (1.0 - keep) * now);
-}
-
-void EkfTracker::hold_reported(EkfTrack& track, const MapFix& fix, double elapsed_s) const {
-  const Vector3d now = fix.covariance_map_m2.diagonal();
-  const double keep = std::exp(-std::clamp(elapsed_s, 0.0, 60.0) / kBetterClassDecay_s);
-  track.held_m2 = now.cwiseMax(keep * track.held_m2 + (1.0 - keep) * now);
-  if (elapsed_s > kOutage_s && track.phase == Phase::kRunning) {
-    track.held_m2 = track.held_m2.cwiseMax(Vector3d::Constant(kWrongFix_m * kWrongFix_m));
-  }
-  track.fix_m2 = now;
-}
-
-/// What the filter cannot know of its own error.
-Vector3d EkfTracker::added_variance_m2(const EkfTrack& track) const {
-  return track.correlated_m2 + (track.held_m2 - track.fix_m2).cwiseMax(0.0) +
-         doubt_left(track) * track.doubt_m2 + floor_variance_m2(track, config_);
 }
 
 void EkfTracker::accept(EkfTrack& track, const MapFix& fix) const {

@@ -18,7 +18,8 @@ namespace trigpoint::gps_odometry {
 struct EkfTrack : Track {
   Ekf15 filter;
   double gyro_bias_sigma_radps{0.0};
-  double up_bias_mps2{0.0};  ///< of the accelerometer along gravity, and of gravity; found at rest
+  double up_error_mps2{0.0};   ///< of the accelerometer along gravity, and of gravity
+  bool knows_up_error{false};  ///< it was found at rest
   HeadingSearch heading;
 
   /// Variance of GPS error that is common to successive fixes (per axis of map): not seen by the
@@ -33,6 +34,7 @@ struct EkfTrack : Track {
   /// in what is published, with health DEGRADED, until the stamp.
   Eigen::Vector3d doubt_m2{Eigen::Vector3d::Zero()};
   Nanoseconds doubt_until_ns{0};
+  Eigen::Vector3d refused_innovation_m{Eigen::Vector3d::Zero()};  ///< of the newest refused fix
 };
 
 /// The rules by which measurements change a EkfTrack.
@@ -88,7 +90,8 @@ class EkfTracker {
   void recover(EkfTrack& track, const MapFix& fix) const;
   void recover_height(EkfTrack& track, const MapFix& fix) const;
   void accept(EkfTrack& track, const MapFix& fix) const;
-  void readmit(EkfTrack& track, const MapFix& fix, const Eigen::Vector3d& innovation_m) const;
+  void readmit(EkfTrack& track, const MapFix& fix, bool with_height) const;
+  bool follows_refused(const EkfTrack& track, const Eigen::Vector3d& innovation_m) const;
   void doubt_step(EkfTrack& track, const MapFix& fix) const;
   Eigen::Vector3d added_variance_m2(const EkfTrack& track) const;
   void hold_reported(EkfTrack& track, const MapFix& fix, double elapsed_s) const;
