@@ -52,6 +52,7 @@ Vector15d noise_rates(const MotionNoise& noise, double dt_s) {
   Vector15d q = Vector15d::Zero();
   const auto square = [](double value) { return value * value; };
   q.segment<3>(kAttitude).setConstant(square(noise.attitude_rad_sqrts));
+  q.segment<2>(kAttitude).array() += square(noise.tilt_rad_sqrts);
   q.segment<2>(kVelocity).setConstant(square(noise.velocity_mps_sqrts));
   q(kVelocity + 2) = square(noise.velocity_up_mps_sqrts);
   q.segment<3>(kRate).setConstant(square(noise.rate_radps_sqrts));

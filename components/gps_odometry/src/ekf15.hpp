@@ -34,6 +34,7 @@ struct MotionNoise {
   double rate_radps_sqrts{0.0};
   double acceleration_sigma_mps2{1.0};
   double acceleration_tau_s{2.0};
+  double tilt_rad_sqrts{0.0};  ///< of roll and pitch, beyond the attitude's
 };
 
 struct Ekf15 {

@@ -5,6 +5,7 @@
 #include "trigpoint/base/so3.hpp"
 
 #include "chi_square.hpp"
+#include "gravity.hpp"
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
@@ -70,6 +71,11 @@ MotionNoise EkfTracker::noise(const EkfTrack& track) const {
   MotionNoise noise;
   noise.attitude_rad_sqrts = std::hypot(config_.attitude_noise_rad_sqrts,
                                         track.gyro_bias_sigma_radps * std::sqrt(gyro_horizon_s));
+  // A horizontal accelerometer bias b is taken for the tilt b / g. It turns with the body, the tilt
+  // does not: while turning at w their difference changes by b w / g, in a sense that lasts for
+  // 1 / w. As white noise (2 sigma^2 tau) this is 2 (b / g)^2 for each radian turned.
+  const double bias_tilt_rad = config_.accel_bias_sigma_mps2 / kGravity_mps2;
+  noise.tilt_rad_sqrts = bias_tilt_rad * std::sqrt(2.0 * track.filter.x.segment<3>(kRate).norm());
   noise.velocity_mps_sqrts = config_.accel_bias_sigma_mps2 * std::sqrt(accel_horizon_s);
   const double up_share = track.knows_up_error ? kUpErrorLeft : 1.0;
   noise.velocity_up_mps_sqrts = up_share * noise.velocity_mps_sqrts;
