@@ -29,9 +29,9 @@ constexpr double kAligningSpeedSigma_mps = 1.0;
 constexpr double kGyroBiasGrowth = 3.3;
 constexpr double kAccelBiasGrowth = 3.0;
 constexpr double kIgnoredHeight_m2 = 1e8;
-// Share of the accelerometer's error along z that is left once it was seen at rest: on a slope of
+// Share of an accelerometer's error that is left once it was seen (upwards at rest): on a slope of
 // 10 degrees the horizontal errors add 17 %, and it wanders by a third until the next rest.
-constexpr double kUpErrorLeft = 0.4;
+constexpr double kErrorLeft = 0.4;
 constexpr double kSteep_rad = 1.4;  // roll pitch yaw become singular at pitch 90 degrees
 
 }  // namespace
@@ -76,9 +76,14 @@ MotionNoise EkfTracker::noise(const EkfTrack& track) const {
   // 1 / w. As white noise (2 sigma^2 tau) this is 2 (b / g)^2 for each radian turned.
   const double bias_tilt_rad = config_.accel_bias_sigma_mps2 / kGravity_mps2;
   noise.tilt_rad_sqrts = bias_tilt_rad * std::sqrt(2.0 * track.filter.x.segment<3>(kRate).norm());
-  noise.velocity_mps_sqrts = config_.accel_bias_sigma_mps2 * std::sqrt(accel_horizon_s);
-  const double up_share = track.knows_up_error ? kUpErrorLeft : 1.0;
-  noise.velocity_up_mps_sqrts = up_share * noise.velocity_mps_sqrts;
+  // So of the horizontal errors only what wanders is left to grow with the age; upwards, where no
+  // tilt can stand for it, the whole until a rest has shown it.
+  const double level_horizon_s =
+      std::max(config_.accel_bias_horizon_s, kErrorLeft * kErrorLeft * kAccelBiasGrowth * age_s);
+  noise.velocity_mps_sqrts = config_.accel_bias_sigma_mps2 * std::sqrt(level_horizon_s);
+  const double up_share = track.knows_up_error ? kErrorLeft : 1.0;
+  noise.velocity_up_mps_sqrts =
+      up_share * config_.accel_bias_sigma_mps2 * std::sqrt(accel_horizon_s);
   noise.rate_radps_sqrts = config_.rate_noise_radps_sqrts;
   noise.acceleration_sigma_mps2 = config_.acceleration_sigma_mps2;
   noise.acceleration_tau_s = config_.acceleration_tau_s;
