@@ -75,7 +75,10 @@ MotionNoise EkfTracker::noise(const EkfTrack& track) const {
   // does not: while turning at w their difference changes by b w / g, in a sense that lasts for
   // 1 / w. As white noise (2 sigma^2 tau) this is 2 (b / g)^2 for each radian turned.
   const double bias_tilt_rad = config_.accel_bias_sigma_mps2 / kGravity_mps2;
-  noise.tilt_rad_sqrts = bias_tilt_rad * std::sqrt(2.0 * track.filter.x.segment<3>(kRate).norm());
+  // What the gyro's noise shows is no turn.
+  const double turn_radps =
+      std::max(0.0, track.filter.x.segment<3>(kRate).norm() - 3.0 * config_.gyro_sigma_radps);
+  noise.tilt_rad_sqrts = bias_tilt_rad * std::sqrt(2.0 * turn_radps);
   // So of the horizontal errors only what wanders is left to grow with the age; upwards, where no
   // tilt can stand for it, the whole until a rest has shown it.
   const double level_horizon_s =
