@@ -79,14 +79,12 @@ MotionNoise EkfTracker::noise(const EkfTrack& track) const {
   const double turn_radps =
       std::max(0.0, track.filter.x.segment<3>(kRate).norm() - 3.0 * config_.gyro_sigma_radps);
   noise.tilt_rad_sqrts = bias_tilt_rad * std::sqrt(2.0 * turn_radps);
-  // So of the horizontal errors only what wanders is left to grow with the age; upwards, where no
-  // tilt can stand for it, the whole until a rest has shown it.
-  const double level_horizon_s =
-      std::max(config_.accel_bias_horizon_s, kErrorLeft * kErrorLeft * kAccelBiasGrowth * age_s);
-  noise.velocity_mps_sqrts = config_.accel_bias_sigma_mps2 * std::sqrt(level_horizon_s);
+  // So of the horizontal errors only what wanders is left for the velocity; upwards, where no tilt
+  // can stand for it, the whole until a rest has shown it.
+  const double velocity_mps_sqrts = config_.accel_bias_sigma_mps2 * std::sqrt(accel_horizon_s);
+  noise.velocity_mps_sqrts = kErrorLeft * velocity_mps_sqrts;
   const double up_share = track.knows_up_error ? kErrorLeft : 1.0;
-  noise.velocity_up_mps_sqrts =
-      up_share * config_.accel_bias_sigma_mps2 * std::sqrt(accel_horizon_s);
+  noise.velocity_up_mps_sqrts = up_share * velocity_mps_sqrts;
   noise.rate_radps_sqrts = config_.rate_noise_radps_sqrts;
   noise.acceleration_sigma_mps2 = config_.acceleration_sigma_mps2;
   noise.acceleration_tau_s = config_.acceleration_tau_s;
