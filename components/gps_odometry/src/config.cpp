@@ -203,7 +203,7 @@ void describe_imu(Config& c, ConfigFields& f) {
            kPositive);
   f.number("rate_noise_radps_sqrts",
            c.rate_noise_radps_sqrts,
-           "Random walk of the body rates (rad/s/sqrt(s))",
+           "Random walk of the body rates (rad/s/sqrt(s)): 1 rad/s^2 for half a second is 0.7",
            kPositive);
   f.number("acceleration_sigma_mps2",
            c.acceleration_sigma_mps2,

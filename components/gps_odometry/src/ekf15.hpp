@@ -31,9 +31,11 @@ enum StateIndex : int {
 struct MotionNoise {
   double attitude_rad_sqrts{0.0};
   double velocity_mps_sqrts{0.0};
+  double velocity_up_mps_sqrts{0.0};  ///< along z of base_link, which is nearly up
   double rate_radps_sqrts{0.0};
   double acceleration_sigma_mps2{1.0};
   double acceleration_tau_s{2.0};
+  double tilt_rad_sqrts{0.0};  ///< of roll and pitch, beyond the attitude's
 };
 
 struct Ekf15 {

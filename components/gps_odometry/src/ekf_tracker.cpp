@@ -5,6 +5,7 @@
 #include "trigpoint/base/so3.hpp"
 
 #include "chi_square.hpp"
+#include "gravity.hpp"
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
@@ -28,6 +29,9 @@ constexpr double kAligningSpeedSigma_mps = 1.0;
 constexpr double kGyroBiasGrowth = 3.3;
 constexpr double kAccelBiasGrowth = 3.0;
 constexpr double kIgnoredHeight_m2 = 1e8;
+// Share of an accelerometer's error that is left once it was seen (upwards at rest): on a slope of
+// 10 degrees the horizontal errors add 17 %, and it wanders by a third until the next rest.
+constexpr double kErrorLeft = 0.4;
 constexpr double kSteep_rad = 1.4;  // roll pitch yaw become singular at pitch 90 degrees
 
 }  // namespace
@@ -69,7 +73,20 @@ MotionNoise EkfTracker::noise(const EkfTrack& track) const {
   MotionNoise noise;
   noise.attitude_rad_sqrts = std::hypot(config_.attitude_noise_rad_sqrts,
                                         track.gyro_bias_sigma_radps * std::sqrt(gyro_horizon_s));
-  noise.velocity_mps_sqrts = config_.accel_bias_sigma_mps2 * std::sqrt(accel_horizon_s);
+  // A horizontal accelerometer bias b is taken for the tilt b / g. It turns with the body, the tilt
+  // does not: while turning at w their difference changes by b w / g, in a sense that lasts for
+  // 1 / w. As white noise (2 sigma^2 tau) this is 2 (b / g)^2 for each radian turned.
+  const double bias_tilt_rad = config_.accel_bias_sigma_mps2 / kGravity_mps2;
+  // What the gyro's noise shows is no turn.
+  const double turn_radps =
+      std::max(0.0, track.filter.x.segment<3>(kRate).norm() - 3.0 * config_.gyro_sigma_radps);
+  noise.tilt_rad_sqrts = bias_tilt_rad * std::sqrt(2.0 * turn_radps);
+  // So of the horizontal errors only what wanders is left for the velocity; upwards, where no tilt
+  // can stand for it, the whole until a rest has shown it.
+  const double velocity_mps_sqrts = config_.accel_bias_sigma_mps2 * std::sqrt(accel_horizon_s);
+  noise.velocity_mps_sqrts = kErrorLeft * velocity_mps_sqrts;
+  const double up_share = track.knows_up_error ? kErrorLeft : 1.0;
+  noise.velocity_up_mps_sqrts = up_share * velocity_mps_sqrts;
   noise.rate_radps_sqrts = config_.rate_noise_radps_sqrts;
   noise.acceleration_sigma_mps2 = config_.acceleration_sigma_mps2;
   noise.acceleration_tau_s = config_.acceleration_tau_s;
@@ -93,10 +110,13 @@ void EkfTracker::apply(EkfTrack& track, const CheckedImu& imu) const {
       track.filter.P.block<3, 3>(kAttitude, kAttitude).diagonal().array() +=
           gap_s * kTiltSigma_rad * kTiltSigma_rad;
     }
+    if (imu.quiet) {
+      learn_at_rest(track, *imu.quiet);
+    }
     if (!is_saturated(imu, config_)) {  // else motion is as unknown as without a sample
       update_imu(track.filter,
                  imu.gyro_radps,
-                 imu.accel_mps2,
+                 imu.accel_mps2 - track.up_error_mps2 * imu.mean_accel_mps2.normalized(),
                  config_.gyro_sigma_radps,
                  config_.accel_sigma_mps2);
     }
@@ -117,6 +137,9 @@ FixOutcome EkfTracker::apply(EkfTrack& track, const MapFix& fix) const {
   const bool lost =
       track.phase == Phase::kRunning && (yaw_sigma_rad(track) > config_.heading_lost_rad ||
                                          (is_unconfirmed(track) && contradicts(track, fix)));
+  if (track.phase == Phase::kRunning) {
+    doubt_step(track, fix);
+  }
   if (lost) {
     track.phase = Phase::kAligning;
     track.heading.restart();
@@ -253,6 +276,7 @@ FixOutcome EkfTracker::filter_fix(EkfTrack& track, const MapFix& fix) const {
                       ", expected at most " + std::to_string(gate2_) + " (2 degrees of freedom).");
   }
   FixOutcome outcome{true, "", ""};
+  const bool follows = follows_refused(track, innovation);
   Matrix3d R = fix.covariance_map_m2;
   if (innovation.z() * innovation.z() > gate1_ * S(2, 2)) {
     outcome = {true,
@@ -271,7 +295,11 @@ FixOutcome EkfTracker::filter_fix(EkfTrack& track, const MapFix& fix) const {
   } else {
     track.refused_height = RefusedStreak{};
   }
-  update_antenna(filter, fix.antenna_map_m, R, lever_base_m_);
+  if (follows) {
+    readmit(track, fix, outcome.reason.empty());
+  } else {
+    update_antenna(filter, fix.antenna_map_m, R, lever_base_m_);
+  }
   accept(track, fix);
   prove_heading(track, fix);
   return outcome;
@@ -282,6 +310,7 @@ FixOutcome EkfTracker::refuse(EkfTrack& track,
                               const std::string& reason,
                               const std::string& text) const {
   extend(track.refused, fix, config_.highest_speed_mps);
+  track.refused_innovation_m = fix.antenna_map_m - expected_antenna(track.filter.x, lever_base_m_);
   if (is_believed(track.refused, config_.recovery_s)) {
     recover(track, fix);
     return {true,
@@ -295,61 +324,11 @@ FixOutcome EkfTracker::refuse(EkfTrack& track,
   return {false, reason, "Fix refused: " + text};
 }
 
-void EkfTracker::recover(EkfTrack& track, const MapFix& fix) const {
-  const Vector3d before = pose(track).p;
-  if (track.phase == Phase::kRunning) {
-    Ekf15& filter = track.filter;
-    const Vector3d innovation = fix.antenna_map_m - expected_antenna(filter.x, lever_base_m_);
-    filter.x.segment<3>(kPosition) += innovation;
-    reset_block(filter, kPosition, fix.covariance_map_m2);
-    const Matrix3d P_velocity =
-        filter.P.block<3, 3>(kVelocity, kVelocity) + Matrix3d::Identity() * 4.0;
-    reset_block(filter, kVelocity, P_velocity);
-    // A position that had to be set may have been lost because of the heading.
-    filter.P(kAttitude + 2, kAttitude + 2) += 0.25;
-    // Who was right is open: the published sigma remembers half of the disagreement for a while.
-    track.correlated_m2 = track.correlated_m2.cwiseMax(0.25 * innovation.cwiseAbs2());
-  } else {
-    track.heading.restart();
-  }
-  ++track.recoveries;
-  track.refused_height = RefusedStreak{};
-  track.accepted_ns = fix.checked.stamp_ns;  // what was just raised must not decay at once
-  accept(track, fix);
-  ++track.reset.counter;
-  track.reset.delta = {0.0, pose(track).p - before};
-  track.reset_ns = fix.checked.stamp_ns;
-}
-
-void EkfTracker::recover_height(EkfTrack& track, const MapFix& fix) const {
-  Ekf15& filter = track.filter;
-  const double innovation = fix.antenna_map_m.z() - expected_antenna(filter.x, lever_base_m_).z();
-  for (const int i : {kPosition + 2, kVelocity + 2}) {
-    const double variance = i == kPosition + 2 ? fix.covariance_map_m2(2, 2) : filter.P(i, i) + 1.0;
-    filter.P.row(i).setZero();
-    filter.P.col(i).setZero();
-    filter.P(i, i) = variance;
-  }
-  filter.x(kPosition + 2) += innovation;
-  track.correlated_m2.z() = std::max(track.correlated_m2.z(), 0.25 * innovation * innovation);
-  track.refused_height = RefusedStreak{};
-  ++track.recoveries;
-  ++track.reset.counter;
-  track.reset.delta = {0.0, Vector3d(0.0, 0.0, innovation)};
-  track.reset_ns = fix.checked.stamp_ns;
-}
-
-/// Peak hold: rises at once, falls with the decay time.
-void EkfTracker::hold_correlated(EkfTrack& track, const MapFix& fix, double elapsed_s) const {
-  const Vector3d now = config_.fix_correlated_share * fix.covariance_map_m2.diagonal();
-  const double keep = std::exp(-std::clamp(elapsed_s, 0.0, 60.0) / config_.correlated_decay_s);
-  track.correlated_m2 = now.cwiseMax(keep * track.correlated_m2 + (1.0 - keep) * now);
-}
-
 void EkfTracker::accept(EkfTrack& track, const MapFix& fix) const {
   const double elapsed_s =
       track.accepted_ns > 0 ? to_seconds(fix.checked.stamp_ns - track.accepted_ns) : 0.0;
   hold_correlated(track, fix, elapsed_s);
+  hold_reported(track, fix, elapsed_s);
   note_accepted(track, fix);
   if (track.phase == Phase::kRunning) {
     const auto H = antenna_jacobian(track.filter.x, lever_base_m_);
@@ -359,8 +338,7 @@ void EkfTracker::accept(EkfTrack& track, const MapFix& fix) const {
     track.accepted_antenna_map_m = fix.antenna_map_m;
     track.accepted_covariance_map_m2 = fix.covariance_map_m2;
   }
-  track.accepted_covariance_map_m2.diagonal() +=
-      track.correlated_m2 + floor_variance_m2(track, config_);
+  track.accepted_covariance_map_m2.diagonal() += added_variance_m2(track);
 }
 
 // ---- what is published --------------------------------------------------------------------------
@@ -383,7 +361,7 @@ PoseCovariance EkfTracker::pose_covariance(const EkfTrack& track) const {
   J.bottomRightCorner<3, 3>() = track.filter.R_map_base() * body_from_euler_rates(rpy);
   PoseCovariance covariance = J * track.filter.P.topLeftCorner<6, 6>() * J.transpose();
   if (track.phase == Phase::kRunning) {
-    covariance.diagonal().head<3>() += track.correlated_m2 + floor_variance_m2(track, config_);
+    covariance.diagonal().head<3>() += added_variance_m2(track);
     return 0.5 * (covariance + covariance.transpose());
   }
   PoseCovariance aligning = PoseCovariance::Zero();
@@ -425,7 +403,8 @@ Estimate EkfTracker::estimate(const EkfTrack& track) const {
 }
 
 bool EkfTracker::is_doubtful(const EkfTrack& track) const {
-  return std::abs(track.filter.x(kAttitude + 1)) > kSteep_rad;
+  return std::abs(track.filter.x(kAttitude + 1)) > kSteep_rad ||
+         track.stamp_ns < track.doubt_until_ns;
 }
 
 void EkfTracker::change_frame(EkfTrack& track,

@@ -18,11 +18,23 @@ namespace trigpoint::gps_odometry {
 struct EkfTrack : Track {
   Ekf15 filter;
   double gyro_bias_sigma_radps{0.0};
+  double up_error_mps2{0.0};   ///< of the accelerometer along gravity, and of gravity
+  bool knows_up_error{false};  ///< it was found at rest
   HeadingSearch heading;
 
   /// Variance of GPS error that is common to successive fixes (per axis of map): not seen by the
   /// filter, added to what is published.
   Eigen::Vector3d correlated_m2{Eigen::Vector3d::Zero()};
+  /// Peak hold of what the receiver reported, while it reports less (a float before a fix), or of
+  /// some dead reckoning. Fades slowly: nothing shows that a better solution is right.
+  Eigen::Vector3d held_m2{Eigen::Vector3d::Zero()};
+  Eigen::Vector3d fix_m2{Eigen::Vector3d::Zero()};  ///< of the newest accepted fix
+
+  /// A contradiction between fixes and filter that ended with following the fixes: its size, held
+  /// in what is published, with health DEGRADED, until the stamp.
+  Eigen::Vector3d doubt_m2{Eigen::Vector3d::Zero()};
+  Nanoseconds doubt_until_ns{0};
+  Eigen::Vector3d refused_innovation_m{Eigen::Vector3d::Zero()};  ///< of the newest refused fix
 };
 
 /// The rules by which measurements change a EkfTrack.
@@ -65,6 +77,7 @@ class EkfTracker {
 
  private:
   void start(EkfTrack& track, const CheckedImu& imu) const;
+  void learn_at_rest(EkfTrack& track, const QuietWindow& quiet) const;
   void advance(EkfTrack& track, Nanoseconds stamp_ns) const;
   MotionNoise noise(const EkfTrack& track) const;
 
@@ -81,6 +94,11 @@ class EkfTracker {
   void recover(EkfTrack& track, const MapFix& fix) const;
   void recover_height(EkfTrack& track, const MapFix& fix) const;
   void accept(EkfTrack& track, const MapFix& fix) const;
+  void readmit(EkfTrack& track, const MapFix& fix, bool with_height) const;
+  bool follows_refused(const EkfTrack& track, const Eigen::Vector3d& innovation_m) const;
+  void doubt_step(EkfTrack& track, const MapFix& fix) const;
+  Eigen::Vector3d added_variance_m2(const EkfTrack& track) const;
+  void hold_reported(EkfTrack& track, const MapFix& fix, double elapsed_s) const;
   void hold_correlated(EkfTrack& track, const MapFix& fix, double elapsed_s) const;
   double teleport_limit_m(const EkfTrack& track, const MapFix& fix) const;
 

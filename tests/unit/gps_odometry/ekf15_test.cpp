@@ -45,7 +45,7 @@ Eigen::Matrix<double, M, 15> numerical_jacobian(const Vector15d& x, const Functi
 }
 
 MotionNoise some_noise() {
-  return {0.01, 0.1, 1.0, 1.5, kTau_s};
+  return {0.01, 0.1, 0.1, 1.0, 1.5, kTau_s};
 }
 
 TEST(Ekf15, has_the_jacobian_of_its_motion_model) {
@@ -107,6 +107,22 @@ TEST(Ekf15, grows_the_same_uncertainty_however_the_time_is_cut) {
     const double ratio = std::sqrt(at_once.P(i, i) / in_pieces.P(i, i));
     EXPECT_NEAR(ratio, 1.0, 0.02) << "state " << i;
   }
+}
+
+/// A random walk of the rate with q = 1 whose end is known leaves dt^3 / 12 of the angle's variance
+/// (Brownian bridge), on top of what the noise of the sample leaves.
+TEST(Ekf15, leaves_between_two_gyro_samples_what_a_random_walk_of_the_rate_leaves) {
+  constexpr double kDt_s = 0.01;
+  constexpr double kRelative = 1e-3;  // of the gyro's remaining noise
+  MotionNoise noise;
+  noise.rate_radps_sqrts = 1.0;
+  Ekf15 filter;
+  filter.P = 1e-18 * Matrix15d::Identity();
+  predict(filter, kDt_s, 0.02, noise);
+  EXPECT_NEAR(filter.P(kAttitude + 2, kAttitude + 2), std::pow(kDt_s, 3) / 3.0, 1e-12);
+  update_imu(filter, Eigen::Vector3d::Zero(), expected_specific_force(filter.x), 1e-4, 10.0);
+  const double bridge = std::pow(kDt_s, 3) / 12.0;
+  EXPECT_NEAR(filter.P(kAttitude + 2, kAttitude + 2), bridge, kRelative * bridge);
 }
 
 TEST(Ekf15, learns_roll_and_pitch_from_gravity) {

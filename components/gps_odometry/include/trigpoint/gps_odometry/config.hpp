@@ -108,7 +108,7 @@ struct Config {
   double accel_bias_sigma_mps2{0.05};
   double accel_bias_horizon_s{3.0};
   double attitude_noise_rad_sqrts{0.0005};
-  double rate_noise_radps_sqrts{1.0};
+  double rate_noise_radps_sqrts{0.7};
   double acceleration_sigma_mps2{1.5};
   double acceleration_tau_s{2.0};
   double longest_step_s{0.02};
