@@ -2,44 +2,14 @@
 // Copyright the Trigpoint developers
 #include "ikd_tree.hpp"
 
+#include "ikd_node.hpp"
+
 #include <algorithm>
-#include <chrono>
-#include <limits>
 #include <tuple>
-#include <utility>
 
 namespace trigpoint::lio_mapper {
 
 namespace {
-
-constexpr std::size_t kBucketSize = 16;
-using Lanes = Eigen::Array<float, kBucketSize, 1>;
-
-/// Some points of a leaf, coordinate by coordinate, so that distances to all come at once.
-struct Bucket {
-  Lanes x{Lanes::Zero()};
-  Lanes y{Lanes::Zero()};
-  Lanes z{Lanes::Zero()};
-  std::array<float, kBucketSize> intensity{};
-  std::uint32_t count{0};
-
-  PointXyzi point(std::uint32_t i) const { return {x[i], y[i], z[i], intensity[i]}; }
-
-  void push(const PointXyzi& p) {
-    x[count] = p.x;
-    y[count] = p.y;
-    z[count] = p.z;
-    intensity[count++] = p.intensity;
-  }
-
-  void remove(std::uint32_t i) {
-    --count;
-    x[i] = x[count];
-    y[i] = y[count];
-    z[i] = z[count];
-    intensity[i] = intensity[count];
-  }
-};
 
 bool at_same_place(const PointXyzi& a, const PointXyzi& b) {
   return a.x == b.x && a.y == b.y && a.z == b.z;
@@ -66,58 +36,6 @@ VoxelIndex voxel_of(const PointXyzi& p, float inverse_voxel_per_m) {
 
 }  // namespace
 
-/// Four lanes, of which three count, so that a distance to a box is a handful of instructions.
-struct IkdTree::Bounds {
-  Eigen::Array4f low{Eigen::Array4f::Constant(std::numeric_limits<float>::infinity())};
-  Eigen::Array4f high{Eigen::Array4f::Constant(-std::numeric_limits<float>::infinity())};
-
-  void add(const PointXyzi& p) {
-    const Eigen::Array4f at{p.x, p.y, p.z, 0.0F};
-    low = low.min(at);
-    high = high.max(at);
-  }
-
-  void add(const Bounds& other) {
-    low = low.min(other.low);
-    high = high.max(other.high);
-  }
-
-  bool contains(const PointXyzi& p) const {
-    const Eigen::Array4f at{p.x, p.y, p.z, 0.0F};
-    return (at >= low).all() && (at <= high).all();
-  }
-
-  bool meets(const Bounds& other) const {
-    return (low <= other.high).all() && (other.low <= high).all();
-  }
-
-  /// Summed in the order of the distance to a point, so that rounding keeps it a lower bound.
-  float distance2(const Eigen::Array4f& query) const {
-    const Eigen::Array4f outside = (low - query).max(query - high).max(0.0F);
-    const Eigen::Array4f squares = outside * outside;
-    return squares[0] + squares[1] + squares[2];
-  }
-};
-
-/// A leaf with a bucket, or two children.
-struct IkdTree::Node {
-  Bounds bounds;  ///< of the points; may be too large after deletions
-  NodePtr left;   ///< below `split` along `axis` when it was made; a new point goes by that, too
-  NodePtr right;
-  std::unique_ptr<Bucket> bucket;
-  float split{0.0F};
-  int axis{0};
-  std::uint32_t size{0};
-  std::uint32_t held{0};  ///< points since the last rebuild, deleted ones included
-  bool touched{false};    ///< changed since the balance was last looked at
-
-  bool is_leaf() const { return bucket != nullptr; }
-
-  Box box() const {
-    return {Eigen::Vector3f(bounds.low.head<3>()), Eigen::Vector3f(bounds.high.head<3>())};
-  }
-};
-
 IkdTree::IkdTree(const IkdTreeLimits& limits) : limits_(limits), root_(build_subtree({})) {}
 
 IkdTree::~IkdTree() {
@@ -141,7 +59,7 @@ IkdTree::NodePtr IkdTree::build_subtree(std::span<PointXyzi> points) {
   node->held = node->size;
   // Half full, so that the next points find room.
   if (points.size() <= kBucketSize / 2) {
-    node->bucket = std::make_unique<Bucket>();
+    node->bucket = std::make_unique<IkdBucket>();
     for (const PointXyzi& point : points) {
       node->bucket->push(point);
     }
@@ -325,7 +243,7 @@ void IkdTree::unlink(Node& node) {
   } else {
     garbage_.push_back(std::move(node.left));
     garbage_.push_back(std::move(node.right));
-    node.bucket = std::make_unique<Bucket>();
+    node.bucket = std::make_unique<IkdBucket>();
   }
   node.bounds = {};
   node.size = 0;
@@ -414,11 +332,11 @@ struct IkdTree::Search {
     }
   }
 
-  void look_into(const Bucket& bucket) {
-    const Lanes dx = bucket.x - query[0];
-    const Lanes dy = bucket.y - query[1];
-    const Lanes dz = bucket.z - query[2];
-    const Lanes distance2 = dx * dx + dy * dy + dz * dz;
+  void look_into(const IkdBucket& bucket) {
+    const BucketLanes dx = bucket.x - query[0];
+    const BucketLanes dy = bucket.y - query[1];
+    const BucketLanes dz = bucket.z - query[2];
+    const BucketLanes distance2 = dx * dx + dy * dy + dz * dz;
     for (std::uint32_t i = 0; i < bucket.count; ++i) {
       if (distance2[i] <= farthest2) {
         offer({distance2[i], {bucket.x[i], bucket.y[i], bucket.z[i]}});
@@ -460,151 +378,6 @@ std::size_t IkdTree::nearest(const Eigen::Vector3f& query_m,
       {query_m.x(), query_m.y(), query_m.z(), 0.0F}, found, 0, max_distance_m * max_distance_m};
   search(*root_, search_for);
   return search_for.count;
-}
-
-// ---- Balance ---------------------------------------------------------------------------------
-
-/// [1], the two criteria of its section on re-balancing. Where a bucket or two hold everything
-/// there is nothing to balance.
-bool IkdTree::out_of_balance(const Node& node) const {
-  if (node.is_leaf() || node.held <= 2 * kBucketSize) {
-    return false;
-  }
-  const std::uint32_t larger = std::max(node.left->size, node.right->size);
-  return static_cast<double>(larger) > limits_.unbalanced_share * node.size ||
-         static_cast<double>(node.held - node.size) > limits_.deleted_share * node.held;
-}
-
-void IkdTree::restore_balance(NodePtr& node, std::vector<bool>& way) {
-  if (!node->touched || node.get() == rebuild_.target) {
-    return;  // what is rebuilt aside will be balanced
-  }
-  if (out_of_balance(*node)) {
-    if (node->size > limits_.rebuilt_aside) {
-      if (rebuild_.target == nullptr) {
-        start_rebuild(node, way);
-        return;
-      }
-      // Stays touched, so that it is looked at again when the other rebuild is done.
-    } else {
-      scratch_.clear();
-      collect(*node, scratch_);
-      node = build_subtree(scratch_);
-      return;
-    }
-  } else {
-    node->touched = false;
-  }
-  if (node->is_leaf()) {
-    return;
-  }
-  for (const bool right : {false, true}) {
-    NodePtr& child = right ? node->right : node->left;
-    way.push_back(right);
-    restore_balance(child, way);
-    way.pop_back();
-    node->touched = node->touched || child->touched;
-  }
-}
-
-void IkdTree::finish_change() {
-  std::vector<bool> way;
-  restore_balance(root_, way);
-}
-
-void IkdTree::start_rebuild(const NodePtr& node, const std::vector<bool>& way) {
-  auto points = std::make_shared<PointCloud>();
-  points->reserve(node->size);
-  collect(*node, *points);
-  auto garbage = std::make_shared<std::vector<NodePtr>>(std::move(garbage_));
-  garbage_.clear();
-  rebuild_.target = node.get();
-  rebuild_.way = way;
-  rebuild_.changes.clear();
-  ++rebuilds_aside_;
-  rebuild_.result = std::async(std::launch::async, [points, garbage]() mutable {
-    garbage->clear();
-    return build_subtree(*points);
-  });
-}
-
-void IkdTree::take_rebuild_if_done() {
-  if (rebuild_.result.valid() &&
-      rebuild_.result.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
-    put_in_place(rebuild_.result.get());
-  }
-}
-
-void IkdTree::finish_rebuilds() {
-  while (rebuild_.result.valid()) {
-    put_in_place(rebuild_.result.get());
-    finish_change();
-  }
-}
-
-void IkdTree::apply(Node& node, const Change& change) {
-  switch (change.kind) {
-    case Change::Kind::kInsert:
-      add(node, change.point);
-      break;
-    case Change::Kind::kErase:
-      take_out(node, change.point);
-      break;
-    case Change::Kind::kEraseInside:
-    case Change::Kind::kEraseOutside:
-      erase_box(node, change.box, change.kind == Change::Kind::kEraseInside);
-      break;
-  }
-}
-
-/// Dropped when a box deletion has unlinked the subtree meanwhile: then the way no longer leads
-/// there. Addresses are not given to new nodes before `garbage_` is freed.
-void IkdTree::put_in_place(NodePtr subtree) {
-  const Rebuild done = std::exchange(rebuild_, {});
-  NodePtr* place = &root_;
-  for (const bool right : done.way) {
-    if ((*place)->is_leaf()) {
-      return;
-    }
-    place = right ? &(*place)->right : &(*place)->left;
-  }
-  if (place->get() != done.target) {
-    return;
-  }
-  for (const Change& change : done.changes) {
-    apply(*subtree, change);
-  }
-  garbage_.push_back(std::exchange(*place, std::move(subtree)));
-  (*place)->touched = true;
-  root_->touched = true;
-  NodePtr* above = &root_;
-  for (const bool right : done.way) {
-    (*above)->touched = true;
-    above = right ? &(*above)->right : &(*above)->left;
-  }
-}
-
-// ---- Shape -----------------------------------------------------------------------------------
-
-std::size_t IkdTree::depth_of(const Node& node) {
-  return node.is_leaf() ? 1 : 1 + std::max(depth_of(*node.left), depth_of(*node.right));
-}
-
-std::size_t IkdTree::depth() const {
-  return depth_of(*root_);
-}
-
-std::size_t IkdTree::memory_of(const Node& node) {
-  return sizeof(Node) +
-         (node.is_leaf() ? sizeof(Bucket) : memory_of(*node.left) + memory_of(*node.right));
-}
-
-std::size_t IkdTree::memory_bytes() const {
-  std::size_t bytes = memory_of(*root_);
-  for (const NodePtr& node : garbage_) {
-    bytes += memory_of(*node);
-  }
-  return bytes;
 }
 
 }  // namespace trigpoint::lio_mapper
