@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 #include <stdexcept>
+#include <vector>
 
 namespace trigpoint::exporter {
 
@@ -18,11 +19,51 @@ using lio_mapper::Keyframe;
 /// About 0.6 GB; a campus drive has a tenth.
 constexpr std::size_t kMostVoxels = 8'000'000;
 
+/// How level odom is, is learnt while driving: a keyframe is levelled by what was known this much
+/// farther on. Over that distance odom's own tilt hardly drifts (lio_mapper's drift: 0.06 degree).
+constexpr double kLevellingLag_m = 100.0;
+
+/// Tilt of T_map_odom after some distance.
+struct Level {
+  double distance_m;
+  Eigen::Vector2d tilt_rad;
+};
+
 /// What a first reading tells of one odom epoch.
 struct Epoch {
   std::uint64_t keyframes{0};
   std::optional<YawPose> first_alignment;
+  Eigen::Vector3d aligned_at_odom_m{Eigen::Vector3d::Zero()};  ///< base_link at the first alignment
+  std::vector<Level> levels;                                   ///< of aligned keyframes
+  std::optional<Eigen::Vector3d> newest_odom_m;
+  double distance_m{0.0};
+
+  /// Of a keyframe in turn, when keyframes come in the order of the first reading.
+  void go_to(const Eigen::Vector3d& p_odom_m) {
+    distance_m += newest_odom_m ? (p_odom_m - *newest_odom_m).norm() : 0.0;
+    newest_odom_m = p_odom_m;
+  }
+
+  /// At the present distance plus the lag, or at the end.
+  Eigen::Vector2d tilt_rad() const {
+    const auto after =
+        std::lower_bound(levels.begin(),
+                         levels.end(),
+                         distance_m + kLevellingLag_m,
+                         [](const Level& level, double d) { return level.distance_m < d; });
+    return after == levels.end() ? levels.back().tilt_rad : after->tilt_rad;
+  }
 };
+
+/// The same transform with another tilt, turned about the point `p_odom_m`, which stays.
+YawPose levelled(const YawPose& T_map_odom,
+                 const Eigen::Vector2d& tilt_rad,
+                 const Eigen::Vector3d& p_odom_m) {
+  YawPose turned = T_map_odom;
+  turned.tilt_rad = tilt_rad;
+  turned.p += T_map_odom.pose() * p_odom_m - turned.pose() * p_odom_m;
+  return turned;
+}
 
 using Epochs = std::map<std::uint32_t, Epoch>;
 
@@ -31,10 +72,19 @@ Epochs survey(const KeyframeSource& keyframes, const std::optional<Alignment>& f
   keyframes([&](const Keyframe& keyframe) {
     auto& epoch = epochs[keyframe.odom_epoch];
     ++epoch.keyframes;
+    epoch.go_to(keyframe.T_odom_base.p);
     if (keyframe.aligned && !epoch.first_alignment) {
       epoch.first_alignment = keyframe.T_map_odom;
+      epoch.aligned_at_odom_m = keyframe.T_odom_base.p;
+    }
+    if (keyframe.aligned) {
+      epoch.levels.push_back({epoch.distance_m, keyframe.T_map_odom.tilt_rad});
     }
   });
+  for (auto& [number, epoch] : epochs) {
+    epoch.distance_m = 0.0;
+    epoch.newest_odom_m.reset();
+  }
   const auto of_fallback = fallback ? epochs.find(fallback->odom_epoch) : epochs.end();
   if (of_fallback != epochs.end() && !of_fallback->second.first_alignment) {
     of_fallback->second.first_alignment = fallback->T_map_odom;
@@ -63,12 +113,18 @@ class Renderer {
         tiles_(voxel_m, kMostVoxels, [this](const PointCloud& points) { file_.append(points); }) {}
 
   void add(const Keyframe& keyframe, MapReport& report) {
-    const auto& alignment = epochs_.at(keyframe.odom_epoch).first_alignment;
-    if (!alignment) {
+    Epoch& epoch = epochs_.at(keyframe.odom_epoch);
+    epoch.go_to(keyframe.T_odom_base.p);
+    if (!epoch.first_alignment) {
       ++report.keyframes_left_out;
       return;
     }
-    const YawPose& T_map_odom = keyframe.aligned ? keyframe.T_map_odom : *alignment;
+    YawPose T_map_odom = keyframe.aligned ? keyframe.T_map_odom : *epoch.first_alignment;
+    if (!epoch.levels.empty()) {
+      T_map_odom = levelled(T_map_odom,
+                            epoch.tilt_rad(),
+                            keyframe.aligned ? keyframe.T_odom_base.p : epoch.aligned_at_odom_m);
+    }
     tiles_.add(place(T_map_odom.pose() * keyframe.T_odom_base, keyframe.points_base, report));
     ++report.keyframes;
   }

@@ -79,6 +79,37 @@ TEST_F(RenderKeyframes, places_those_before_the_alignment_by_the_first_of_their_
   EXPECT_TRUE(has_point(101.0F, 0.0F, 0.0F));
 }
 
+TEST_F(RenderKeyframes, levels_each_by_what_was_known_farther_on) {
+  std::vector<Keyframe> frames;
+  for (const double x : {0.0, 60.0, 120.0, 180.0}) {
+    frames.push_back(
+        aligned(keyframe(static_cast<Nanoseconds>(x) + 1, 0, x), 0.0, {10.0, 0.0, 0.0}));
+  }
+  // Pitched down: known from 120 m on.
+  constexpr double kTilt_rad = 0.1;
+  frames[2].T_map_odom.tilt_rad.y() = kTilt_rad;
+  frames[3].T_map_odom.tilt_rad.y() = kTilt_rad;
+  render(frames);
+  const auto cos = static_cast<float>(std::cos(kTilt_rad));
+  const auto sin = static_cast<float>(std::sin(kTilt_rad));
+  // The robot stays where it was, what it saw a metre ahead turns about it.
+  EXPECT_TRUE(has_point(10.0F + cos, 0.0F, -sin));
+  EXPECT_TRUE(has_point(70.0F + cos, 0.0F, -sin));
+  // From there on T_map_odom was right itself.
+  EXPECT_TRUE(has_point(10.0F + 121.0F * cos, 0.0F, -121.0F * sin));
+}
+
+TEST_F(RenderKeyframes, levels_those_before_the_alignment_about_the_place_where_it_came) {
+  Keyframe second = aligned(keyframe(2, 0, 5.0), 0.0, {0.0, 0.0, 0.0});
+  second.T_map_odom.tilt_rad.y() = 0.1;
+  second.T_map_odom.p =
+      Eigen::Vector3d(5.0, 0.0, 0.0) - second.T_map_odom.pose().q * Eigen::Vector3d(5.0, 0.0, 0.0);
+  render({keyframe(1, 0, 3.0), second});
+  // A metre behind the place of the alignment, 0.1 rad lower ahead of it, so higher behind it.
+  EXPECT_TRUE(
+      has_point(5.0F - static_cast<float>(std::cos(0.1)), 0.0F, static_cast<float>(std::sin(0.1))));
+}
+
 TEST_F(RenderKeyframes, leaves_out_an_epoch_that_was_never_aligned_and_says_so) {
   const auto report =
       render({aligned(keyframe(1, 0, 0.0), 0.0, {1.0, 0.0, 0.0}), keyframe(2, 1, 0.0)});
