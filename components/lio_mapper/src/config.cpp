@@ -128,9 +128,9 @@ void describe_surfel_map(SurfelMapConfig& c, ConfigFields& f) {
            {0.0, 1.0});
   f.number("max_residual_m", c.max_residual_m, "farther planes do not explain a point", kPositive);
   f.flag(
-      "nearest_leaves",
-      c.nearest_leaves,
-      "where no plane holds, as in foliage, a point may match one through the nearest leaf means; "
+      "nearest_points",
+      c.nearest_points,
+      "where no plane holds, as in foliage, a point may match one through the five nearest points; "
       "it counts as little as it is thick");
   c.leaf_capacity = static_cast<std::size_t>(capacity);
 }

@@ -26,6 +26,10 @@ constexpr double kFaceBand = 0.1;
 /// ... namely when that leaf's mean is this near to the point across the face.
 constexpr double kSameSurface = 0.2;
 
+/// A point may lie outside the leaf that it belongs to, by the band above: in parts of a parent's
+/// side.
+constexpr double kStoredReach = 0.6;
+
 /// Planes are fitted anew when a leaf has 1, 2, 3, 5, 8, 13, ... points: in between its mean moves
 /// by less than its own noise, and fitting is most of the map's cost.
 bool matters_to_planes(std::size_t count, std::size_t capacity) {
@@ -43,7 +47,8 @@ SurfelMap::SurfelMap(const SurfelMapConfig& config)
     : config_(config),
       inverse_leaf_per_m_(1.0 / config.leaf_m),
       parent_m_(kSide * config.leaf_m),
-      inverse_parent_per_m_(1.0 / parent_m_) {
+      inverse_parent_per_m_(1.0 / parent_m_),
+      stored_unit_m_(kStoredReach * parent_m_ / std::numeric_limits<std::int16_t>::max()) {
   if (!(config.leaf_m > 0.0) || !std::isfinite(config.leaf_m)) {
     throw std::invalid_argument("surfel map: leaf_m is " + std::to_string(config.leaf_m) +
                                 ", expected a positive length");
@@ -72,13 +77,16 @@ void SurfelMap::insert_mean(const PointXyzi& point, std::uint16_t count) {
   if (parent.counts[i] >= config_.leaf_capacity) {
     return;
   }
-  leaf_count_ += parent.counts[i] == 0 ? 1 : 0;
+  const bool first = parent.counts[i] == 0;
+  leaf_count_ += first ? 1 : 0;
   parent.occupied |= 1U << i;
   parent.counts[i] = static_cast<std::uint16_t>(
       std::min<std::size_t>(parent.counts[i] + std::size_t{count}, config_.leaf_capacity));
   const float share =
       static_cast<float>(std::min(count, parent.counts[i])) / static_cast<float>(parent.counts[i]);
-  const Eigen::Vector3f local = (point.position().cast<double>() - centre_of(parent)).cast<float>();
+  const Eigen::Vector3d local_m = point.position().cast<double>() - centre_of(parent);
+  keep_centre_most(parent, inner, local_m, first);
+  const Eigen::Vector3f local = local_m.cast<float>();
   LeafMean& mean = parent.means[i];
   mean.x += share * (local.x() - mean.x);
   mean.y += share * (local.y() - mean.y);
@@ -87,6 +95,25 @@ void SurfelMap::insert_mean(const PointXyzi& point, std::uint16_t count) {
       share * ((std::isfinite(point.intensity) ? point.intensity : 0.0F) - mean.intensity);
   if (matters_to_planes(parent.counts[i], config_.leaf_capacity)) {
     mark_dirty(parent, inner);
+  }
+}
+
+SurfelMap::StoredPoint SurfelMap::stored(const Eigen::Vector3d& local_m) const {
+  const auto number = [this](double value_m) {
+    return static_cast<std::int16_t>(std::lround(value_m / stored_unit_m_));
+  };
+  return {number(local_m.x()), number(local_m.y()), number(local_m.z())};
+}
+
+void SurfelMap::keep_centre_most(Parent& parent,
+                                 const VoxelIndex& inner,
+                                 const Eigen::Vector3d& local_m,
+                                 bool first) const {
+  StoredPoint& kept = parent.points[static_cast<std::size_t>(slot(inner.x, inner.y, inner.z))];
+  const Eigen::Vector3d centre_m =
+      config_.leaf_m * Eigen::Vector3d(inner.x - 1, inner.y - 1, inner.z - 1);
+  if (first || (local_m - centre_m).squaredNorm() < (local(kept) - centre_m).squaredNorm()) {
+    kept = stored(local_m);
   }
 }
 
@@ -213,6 +240,7 @@ void SurfelMap::forget_leaves_outside(Parent& parent,
       parent.occupied &= ~(1U << i);
       parent.counts[at] = 0;
       parent.means[at] = {};
+      parent.points[at] = {};
       --leaf_count_;
       mark_dirty(parent, {i / 9, i / 3 % 3, i % 3});
     }

@@ -56,10 +56,18 @@ class SurfelMap final : public LocalMap {
     float intensity{0.0F};
   };
 
+  /// A point of a leaf, from the parent's centre in parts of `stored_unit_m_`.
+  struct StoredPoint {
+    std::int16_t x{0};
+    std::int16_t y{0};
+    std::int16_t z{0};
+  };
+
   struct Parent {
     VoxelIndex index;
     std::uint32_t occupied{0};  ///< bit i: leaf i has points
     std::array<LeafMean, kLeaves> means{};
+    std::array<StoredPoint, kLeaves> points{};  ///< the one nearest the leaf's centre
     std::array<std::uint16_t, kLeaves> counts{};
     std::array<ParentId, kLeaves> neighbours{};
   };
@@ -88,6 +96,16 @@ class SurfelMap final : public LocalMap {
   void insert_mean(const PointXyzi& mean, std::uint16_t count);
   VoxelIndex leaf_for(const Eigen::Vector3d& point_odom_m) const;
   std::optional<Eigen::Vector3d> mean_of(const VoxelIndex& leaf) const;
+
+  Eigen::Vector3d local(const StoredPoint& point) const {
+    return stored_unit_m_ * Eigen::Vector3d(point.x, point.y, point.z);
+  }
+
+  StoredPoint stored(const Eigen::Vector3d& local_m) const;
+  void keep_centre_most(Parent& parent,
+                        const VoxelIndex& inner,
+                        const Eigen::Vector3d& local_m,
+                        bool first) const;
   void mark_dirty(const Parent& parent, const VoxelIndex& leaf);
   Eigen::Vector3d centre_of(const Parent& parent) const;
   void forget_leaves_outside(Parent& parent, const Eigen::Vector3d& centre, double half_side_m);
@@ -95,7 +113,7 @@ class SurfelMap final : public LocalMap {
 
   std::array<ParentId, 8> candidates(const Eigen::Vector3d& point_odom_m) const;
   const Surfel* surfel(ParentId id, Surfel& scratch) const;
-  bool match_nearest_leaves(const Eigen::Vector3d& point_odom_m,
+  bool match_nearest_points(const Eigen::Vector3d& point_odom_m,
                             const std::array<ParentId, 8>& parents,
                             PlaneMatch& plane) const;
   Surfel fit(const Parent& parent) const;
@@ -107,6 +125,7 @@ class SurfelMap final : public LocalMap {
   double inverse_leaf_per_m_;
   double parent_m_;
   double inverse_parent_per_m_;
+  double stored_unit_m_;
   std::size_t leaf_count_{0};
   std::vector<Parent> parents_;
   mutable std::vector<Surfel> surfels_;  ///< same indices; mutable because fitting is lazy

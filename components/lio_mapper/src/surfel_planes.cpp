@@ -32,9 +32,12 @@ constexpr double kFaceReach = 0.4 / 1.5;
 /// the distance along it: else a point beside a corner may be given to the wall it does not lie on.
 constexpr double kAcrossWeight2 = 9.0;
 
-/// Where no plane holds: this many leaf means, the farthest within so many sides of a leaf.
-constexpr int kNearestLeaves = 5;
-constexpr double kNearestLeafReach = 2.0;
+/// Where no plane holds: this many points, the farthest within so many sides of a leaf, none
+/// farther from their plane, and no line.
+constexpr int kNearestPoints = 5;
+constexpr double kNearestReach = 2.0;
+constexpr double kNearestPlane_m = 0.1;
+constexpr double kLeastNearLinearity = 0.01;
 
 /// (5 mm)^2: no LiDAR knows a surface better, however well the means agree.
 constexpr double kThicknessFloor2_m2 = 2.5e-5;
@@ -100,12 +103,13 @@ bool SurfelMap::match(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) co
     }
   }
   return std::isfinite(least_cost) ||
-         (config_.nearest_leaves && match_nearest_leaves(point_odom_m, parents, plane));
+         (config_.nearest_points && match_nearest_points(point_odom_m, parents, plane));
 }
 
-/// Where no plane holds, as in foliage, the five nearest leaf means tell at least where most of it
-/// is. What they say counts as little as they are thick.
-bool SurfelMap::match_nearest_leaves(const Eigen::Vector3d& point_odom_m,
+/// Where no plane holds, as in foliage: FAST-LIO2's plane through the five nearest points, of those
+/// that the leaves keep. Their means would not do: in a crown they lie at the leaves' centres and
+/// tell nothing of its shape.
+bool SurfelMap::match_nearest_points(const Eigen::Vector3d& point_odom_m,
                                      const std::array<ParentId, 8>& parents,
                                      PlaneMatch& plane) const {
   struct Near {
@@ -113,7 +117,7 @@ bool SurfelMap::match_nearest_leaves(const Eigen::Vector3d& point_odom_m,
     Eigen::Vector3d offset_m{Eigen::Vector3d::Zero()};  ///< from the point
   };
 
-  std::array<Near, kNearestLeaves> nearest{};
+  std::array<Near, kNearestPoints> nearest{};
   for (const ParentId id : parents) {
     if (id == kNoParent) {
       continue;
@@ -121,8 +125,8 @@ bool SurfelMap::match_nearest_leaves(const Eigen::Vector3d& point_odom_m,
     const Parent& parent = parents_[static_cast<std::size_t>(id)];
     const Eigen::Vector3d origin = centre_of(parent) - point_odom_m;
     for (std::uint32_t left = parent.occupied; left != 0; left &= left - 1) {
-      const LeafMean& mean = parent.means[static_cast<std::size_t>(std::countr_zero(left))];
-      Near candidate{0.0, origin + Eigen::Vector3d(mean.x, mean.y, mean.z)};
+      const auto leaf = static_cast<std::size_t>(std::countr_zero(left));
+      Near candidate{0.0, origin + local(parent.points[leaf])};
       candidate.distance2_m2 = candidate.offset_m.squaredNorm();
       for (Near& slot : nearest) {
         if (candidate.distance2_m2 < slot.distance2_m2) {
@@ -131,7 +135,7 @@ bool SurfelMap::match_nearest_leaves(const Eigen::Vector3d& point_odom_m,
       }
     }
   }
-  const double farthest_m = kNearestLeafReach * config_.leaf_m;
+  const double farthest_m = kNearestReach * config_.leaf_m;
   if (!(nearest.back().distance2_m2 < farthest_m * farthest_m)) {
     return false;
   }
@@ -140,15 +144,20 @@ bool SurfelMap::match_nearest_leaves(const Eigen::Vector3d& point_odom_m,
     moments.add(near.offset_m);
   }
   const auto fit = fit_plane(moments);
-  if (!fit || fit->linearity() < config_.min_linearity ||
+  if (!fit || fit->linearity() < kLeastNearLinearity ||
       std::abs(fit->normal.dot(fit->centroid)) > config_.max_residual_m) {
     return false;
+  }
+  for (const Near& near : nearest) {
+    if (std::abs(fit->normal.dot(near.offset_m - fit->centroid)) > kNearestPlane_m) {
+      return false;
+    }
   }
   plane.normal = fit->normal;
   plane.offset_m = -fit->normal.dot(fit->centroid + point_odom_m);
   // Three degrees of freedom of the five went into the plane.
   plane.thickness2_m2 =
-      fit->eigenvalues[0] * kNearestLeaves / (kNearestLeaves - 3) + kThicknessFloor2_m2;
+      fit->eigenvalues[0] * kNearestPoints / (kNearestPoints - 3) + kThicknessFloor2_m2;
   return true;
 }
 

@@ -270,9 +270,9 @@ TEST(SurfelMap, sees_no_plane_in_a_filled_volume) {
   EXPECT_EQ(matched, 0);
 }
 
-TEST(SurfelMap, matches_foliage_by_its_nearest_leaves_and_says_how_thick_it_is) {
+TEST(SurfelMap, matches_foliage_by_its_nearest_points_and_says_how_thick_it_is) {
   SurfelMapConfig config;
-  config.nearest_leaves = true;
+  config.nearest_points = true;
   const auto map = make_surfel_map(config);
   PointCloud blob;
   for (const Eigen::Vector3d& p : random_points(40000, 3.0, 11)) {
