@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
-// Sequences of messages with wild values, stamps and covariances into ekf15 and eskf18. Whatever
-// comes: what is published is finite, its covariances symmetric and positive definite, its stamps
-// go forward, and no state had to be thrown away because it was not finite.
+// Sequences of messages (IMU, fixes, twists, headings, data) with wild values, stamps and
+// covariances into ekf15 and eskf18. Whatever comes: what is published is finite, its covariances
+// symmetric and positive definite, its stamps go forward, and no state had to be thrown away
+// because it was not finite.
 // With clang a libFuzzer target (preset "fuzz"). Else a program of its own that draws sequences:
 //   gps_odometry_fuzz [SEQUENCES] [SEED] [FIRST]
 // Each is drawn from the seed and its number alone: a range can be shared among processes, and a
@@ -231,8 +232,12 @@ class Sequence {
         datum.longitude_deg = bytes_.number(8.4, 0.001);
         datum.height_m = bytes_.number(100.0, 10.0);
         checked_.check(checked_.filter().on_datum(datum));
-      } else if (kind < 130) {
+      } else if (kind < 114) {
         imu_group(1 + kind % 8);
+      } else if (kind < 122) {
+        checked_.check(checked_.filter().on_twist(twist()));
+      } else if (kind < 130) {
+        checked_.check(checked_.filter().on_yaw(yaw()));
       } else {
         checked_.check(checked_.filter().on_fix(fix()));
       }
@@ -344,6 +349,39 @@ class Sequence {
     fix.altitude_m = 100.0;
     fix.covariance_type = CovarianceType::kKnown;
     return fix;
+  }
+
+  /// Mostly of the last quarter of a second, or up to 0.5 s older than the buffer; some ahead.
+  Nanoseconds aiding_stamp() {
+    const std::uint8_t age = bytes_.byte();
+    return now_ns_ - (age < 240 ? 1'000'000LL * age : 150'000'000LL * (age - 245));
+  }
+
+  TwistMeasurement twist() {
+    TwistMeasurement twist;
+    twist.stamp_ns = aiding_stamp();
+    const std::uint8_t kind = bytes_.byte();
+    static constexpr std::array<double, 4> kSigmas_mps{0.0, 0.01, 0.3, 100.0};
+    const double sigma_mps = kSigmas_mps.at(kind % 4);
+    twist.linear_mps = bytes_.vector({kSpeed_mps, 0.0, 0.0}, kind < 200 ? 0.5 : 60.0);
+    twist.covariance_m2ps2 = sigma_mps * sigma_mps * Eigen::Matrix3d::Identity();
+    if (kind % 5 == 0) {
+      bytes_.disturb(twist.covariance_m2ps2, sigma_mps * sigma_mps);
+    }
+    return twist;
+  }
+
+  YawMeasurement yaw() {
+    YawMeasurement yaw;
+    yaw.stamp_ns = aiding_stamp();
+    Eigen::Quaterniond q(
+        Eigen::AngleAxisd(bytes_.number(1.5707963, 3.0), Eigen::Vector3d::UnitZ()));
+    yaw.variance_rad2 = bytes_.number(0.02, 0.03);
+    if (bytes_.byte() % 8 == 0) {
+      bytes_.disturb(q.coeffs(), 0.05);
+    }
+    yaw.q_world_base = q;
+    return yaw;
   }
 
   GnssFix fix() {

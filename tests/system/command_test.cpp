@@ -415,35 +415,6 @@ TEST(Command, evaluate_tells_a_known_offset) {
               AllOf(HasSubstr("50 pairs"), HasSubstr("3.000"), HasSubstr("coverage 100.0 %")));
 }
 
-TEST(Command, gps_plots_makes_a_page_of_the_three_filters_and_never_over_another) {
-  if (run_command({"gnuplot", "--version"}, 10s, {}).exit_code != 0) {
-    GTEST_SKIP() << "gnuplot is not installed: pictures are not tested";
-  }
-  const TemporaryFolder folder;
-  const std::vector<std::string> arguments{"gps-plots",
-                                           "--outage-from",
-                                           "40",
-                                           "--outage",
-                                           "5",
-                                           "--around",
-                                           "5",
-                                           "--out",
-                                           folder.path("p")};
-  const CommandResult result = trigpoint(arguments);
-  EXPECT_EQ(result.exit_code, 0) << result.output;
-  EXPECT_THAT(result.output, HasSubstr(folder.path("p/index.html")));
-  for (const char* file : {"bands.png",
-                           "all.png",
-                           "plots/bands_ekf15.dat",
-                           "plots/bands_eskf18.dat",
-                           "plots/bands_ekf15_strict.dat"}) {
-    EXPECT_TRUE(fs::exists(folder.path(std::string("p/") + file))) << file;
-  }
-  const CommandResult again = trigpoint(arguments);
-  EXPECT_EQ(again.exit_code, 2);
-  EXPECT_THAT(again.output, HasSubstr("index.html already"));
-}
-
 TEST(Command, record_hears_what_play_says) {
   const TemporaryFolder folder;
   const std::map<std::string, std::string> environment{{"ROS_DOMAIN_ID", tests::own_domain(50)}};

@@ -149,6 +149,16 @@ std::unique_ptr<recording::LogReader> open_recorded(const std::string& log,
   }
 }
 
+/// The simulator has neither wheels nor a heading: what was named would be missed in silence.
+void refuse_aiding(const std::string& scenario, const SystemConfig& config) {
+  const RobotConfig& robot = config.cores.robot;
+  if (config.log.require_aiding && !(robot.twist_topic.empty() && robot.yaw_topic.empty())) {
+    throw ConfigError(scenario +
+                      ": a scenario has no topic for robot.twist_topic or robot.yaw_topic; leave "
+                      "them empty, or set log.require_aiding to false");
+  }
+}
+
 Input open_scenario(const InputOptions& options, const std::string& truth_file) {
   const simulator::Scenario scenario =
       simulator::load_scenario(with_changes(options.log, options.changes));
@@ -156,6 +166,7 @@ Input open_scenario(const InputOptions& options, const std::string& truth_file) 
   Input input;
   input.config = configure(options, {scenario.robot, scenario.datum});
   check_cores(input.config);
+  refuse_aiding(options.log, input.config);
   auto reader = simulator::open_scenario(scenario, options.seed.value_or(1), duration_s);
   if (!truth_file.empty()) {
     exporter::create_session_folder(fs::path(truth_file).parent_path().string());

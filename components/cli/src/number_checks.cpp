@@ -44,12 +44,12 @@ CLI::Validator whole_number() {
   return CLI::Validator(check, ">= 0");
 }
 
-std::optional<double> scenario_duration_s(double option_s) {
+std::optional<double> scenario_duration_s(double option_s, const std::string& option) {
   if (option_s == 0.0) {
     return std::nullopt;
   }
   if (!(option_s >= kShortestScenario_s && option_s <= kLongestScenario_s)) {
-    throw ConfigError("--duration: a scenario lasts from 0.1 s to 100000 s");
+    throw ConfigError(option + ": a scenario lasts from 0.1 s to 100000 s");
   }
   return option_s;
 }

@@ -19,8 +19,9 @@ CLI::Validator more_than_zero();
 CLI::Validator whole_number();
 
 /// How long a scenario is driven: the option's value, or nothing (0) for the scenario's own. Throws
-/// ConfigError beyond the longest that a scenario may last.
-std::optional<double> scenario_duration_s(double option_s);
+/// ConfigError, naming `option`, beyond the longest that a scenario may last.
+std::optional<double> scenario_duration_s(double option_s,
+                                          const std::string& option = "--duration");
 
 /// Throws ConfigError when --rate is neither "max" (0 is returned) nor a finite number above 0.
 double rate_of(const std::string& text);

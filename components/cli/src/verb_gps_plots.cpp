@@ -76,7 +76,8 @@ int run(const GpsPlotOptions& options) {
     throw ConfigError("gps-plots: " + options.out +
                       " has an index.html already; expected a new folder for --out.");
   }
-  scenario_duration_s(options.outage_from_s + options.outage_s + options.around_s);
+  scenario_duration_s(options.outage_from_s + options.outage_s + options.around_s,
+                      "--outage-from, --outage and --around together");
   const simulator::Scenario scenario = simulator::load_scenario(options.scenario);
   evaluation::GpsPage page;
   page.title =

@@ -12,6 +12,7 @@ namespace {
 // Drift of the clocks that is followed, as a share of time.
 constexpr double kLeak = 1e-3;
 // Differences within this are one clock with an uneven latency; a step beyond is another clock.
+constexpr double kStep_s = 0.5;
 constexpr Nanoseconds kStep_ns = kNanosecondsPerSecond / 2;
 // So many fixes over so long must agree on a new offset.
 constexpr std::size_t kAgreeing = 3;
@@ -21,6 +22,12 @@ constexpr std::size_t kHeard = 32;
 
 std::string seconds(Nanoseconds duration_ns) {
   return std::to_string(to_seconds(duration_ns)) + " s";
+}
+
+/// From one difference of clocks to another. In seconds: differences of stamps from 0 to 8e9 s fit
+/// into nanoseconds, their differences do not.
+double moved_s(Nanoseconds from_ns, Nanoseconds to_ns) {
+  return to_seconds(to_ns) - to_seconds(from_ns);
 }
 
 }  // namespace
@@ -37,7 +44,7 @@ bool ClockOffset::can_be_latency(Nanoseconds difference_ns) const {
 }
 
 bool ClockOffset::is_known(Nanoseconds difference_ns) const {
-  return is_estimated_ ? std::abs(difference_ns - soonest_ns_) <= kStep_ns
+  return is_estimated_ ? std::abs(moved_s(soonest_ns_, difference_ns)) <= kStep_s
                        : can_be_latency(difference_ns);
 }
 
@@ -66,7 +73,7 @@ bool ClockOffset::heard_before(Nanoseconds stamp_ns) {
 /// differences that run away.
 void ClockOffset::keep(const Candidate& candidate) {
   const auto contradicts = [&](const Candidate& other) {
-    return std::abs(other.difference_ns - candidate.difference_ns) > kStep_ns ||
+    return std::abs(moved_s(other.difference_ns, candidate.difference_ns)) > kStep_s ||
            candidate.imu_ns < other.imu_ns ||
            candidate.imu_ns - other.imu_ns > kLongestAgreement_ns;
   };
@@ -127,22 +134,23 @@ ClockVerdict ClockOffset::other(Nanoseconds stamp_ns, const Candidate& now) {
             : std::string("The fixes' clock is the IMU's: their stamps are used as they are.")};
     return verdict;
   }
-  const Nanoseconds moved_ns = now.difference_ns - (is_estimated_ ? soonest_ns_ : 0);
+  const double off_s = moved_s(is_estimated_ ? soonest_ns_ : 0, now.difference_ns);
   ClockVerdict verdict;
-  verdict.is_ahead = moved_ns > 0;
+  verdict.is_ahead = off_s > 0.0;
   if (is_estimated_) {
     verdict.reason = "clock_jump";
-    verdict.text = "Fix refused: its clock is " + seconds(moved_ns) +
-                   " off what was estimated, expected at most " + seconds(kStep_ns) + ".";
+    verdict.text = "Fix refused: its clock is " + std::to_string(off_s) +
+                   " s off what was estimated, expected at most " + seconds(kStep_ns) + ".";
   } else {
     verdict.stamp_ns = stamp_ns;  // refused for what it seems to be, future or past
   }
   if (candidates_.size() == 2) {
-    verdict.event = Event{Severity::kWarning,
-                          now.imu_ns,
-                          "gnss_clock_moved",
-                          "The fixes' clock is " + seconds(moved_ns) +
-                              " off: fixes are not used until enough of them agree on its offset."};
+    verdict.event =
+        Event{Severity::kWarning,
+              now.imu_ns,
+              "gnss_clock_moved",
+              "The fixes' clock is " + std::to_string(off_s) +
+                  " s off: fixes are not used until enough of them agree on its offset."};
   }
   return verdict;
 }

@@ -55,7 +55,7 @@ void describe_map(Config& c, ConfigFields& f) {
            kPositive);
   f.number("highest_distance_m",
            c.highest_distance_m,
-           "Fixes farther from the datum are refused (m)",
+           "Fixes farther from the datum are refused until one was nearer (m)",
            kPositive);
 }
 

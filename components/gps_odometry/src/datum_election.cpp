@@ -2,6 +2,9 @@
 // Copyright the Trigpoint developers
 #include "datum_election.hpp"
 
+#include "trigpoint/base/config.hpp"
+#include "trigpoint/geodesy/local_frame.hpp"
+
 #include <cmath>
 
 namespace trigpoint::gps_odometry {
@@ -23,6 +26,19 @@ bool agree(const CheckedFix& first, const CheckedFix& second, double highest_spe
 }
 
 }  // namespace
+
+std::optional<Datum> configured_datum(const Config& config) {
+  if (!config.use_configured_datum) {
+    return std::nullopt;
+  }
+  const Datum datum{
+      config.datum_latitude_deg, config.datum_longitude_deg, config.datum_height_m, 0};
+  if (const auto fault =
+          geodesy::find_fault({datum.latitude_deg, datum.longitude_deg, datum.height_m})) {
+    throw ConfigError("gps_odometry: the datum is not a place: " + *fault + ".");
+  }
+  return datum;
+}
 
 bool wins(const Datum& candidate, const Datum& present) {
   if (candidate.elected_ns != present.elected_ns) {

@@ -12,6 +12,9 @@
 
 namespace trigpoint::gps_odometry {
 
+/// The datum that the configuration names, if any; throws ConfigError when that is not a place.
+std::optional<Datum> configured_datum(const Config& config);
+
 /// True when `candidate` replaces `present`: the older election wins; of two elections of one
 /// moment the one with the smaller id, so that everybody decides alike.
 bool wins(const Datum& candidate, const Datum& present);

@@ -59,6 +59,9 @@ void EkfTracker::start(EkfTrack& track, const CheckedImu& imu) const {
   track.filter.P = sigma.cwiseAbs2().asDiagonal();
   track.heading.restart();
   track.aiding = AidingState{};
+  // The IMU's clock may have moved: what was stamped before says nothing any more.
+  track.doubt_m2.setZero();
+  track.doubt_until_ns = 0;
 }
 
 MotionNoise EkfTracker::noise(const EkfTrack& track) const {

@@ -2,7 +2,6 @@
 // Copyright the Trigpoint developers
 #include "trigpoint/gps_odometry/gps_odometry.hpp"
 
-#include "trigpoint/base/config.hpp"
 #include "trigpoint/base/so3.hpp"
 #include "trigpoint/geodesy/local_frame.hpp"
 
@@ -17,6 +16,7 @@
 #include "warm_start.hpp"
 
 #include <cmath>
+#include <utility>
 
 namespace trigpoint::gps_odometry {
 
@@ -24,19 +24,6 @@ namespace {
 
 constexpr Nanoseconds kStatusInterval_ns = kNanosecondsPerSecond;
 constexpr double kFrozenSpeed_mps = 0.5;
-
-std::optional<Datum> configured_datum(const Config& config) {
-  if (!config.use_configured_datum) {
-    return std::nullopt;
-  }
-  const Datum datum{
-      config.datum_latitude_deg, config.datum_longitude_deg, config.datum_height_m, 0};
-  if (const auto fault =
-          geodesy::find_fault({datum.latitude_deg, datum.longitude_deg, datum.height_m})) {
-    throw ConfigError("gps_odometry: the datum is not a place: " + *fault + ".");
-  }
-  return datum;
-}
 
 geodesy::Geographic place_of(const Datum& datum) {
   return {datum.latitude_deg, datum.longitude_deg, datum.height_m};
@@ -75,6 +62,7 @@ struct GpsOdometry::Impl {
               Output& output);
   MapFix place(const CheckedFix& fix) const;
   void elect(const CheckedFix& fix, Output& output);
+  void tell_projection(Output& output);
   void move_to(const Datum& new_datum, Output& output);
   void publish_odometry(Output& output);
   void try_warm_start(Output& output);
@@ -86,6 +74,7 @@ struct GpsOdometry::Impl {
   std::optional<Datum> datum;
   /// The datum's, or until there is one that of the first fix: heading is searched meanwhile.
   std::optional<geodesy::LocalFrame> frame;
+  bool projection_is_news{true};
   ImuChecks imu_checks;
   std::unique_ptr<Filter> filter;
   DatumElection election;
@@ -117,6 +106,7 @@ void GpsOdometry::Impl::refuse(const std::string& reason,
 
 void GpsOdometry::Impl::take_imu(const ImuSample& sample, Output& output) {
   ++imu_received;
+  tell_projection(output);
   if (is_refused(admission.check_frame(Source::kImu, sample.frame_id), sample.stamp_ns, output)) {
     return;
   }
@@ -289,7 +279,9 @@ void GpsOdometry::Impl::move_to(const Datum& new_datum, Output& output) {
   if (frame) {
     const geodesy::Geographic old_origin = place_of(frame->datum());
     const Eigen::Matrix3d R = new_frame.R_map_enu(old_origin);
-    const Eigen::Vector3d t = new_frame.to_map(old_origin).value_or(Eigen::Vector3d::Zero());
+    // Where a grid has ended the tangent plane goes on: the same map.
+    const Eigen::Vector3d t =
+        new_frame.to_map(old_origin).value_or(*geodesy::LocalFrame(new_datum).to_map(old_origin));
     filter->change_frame(R, t);
     if (datum) {
       filter->announce_reset({std::atan2(R(1, 0), R(0, 0)), t});
@@ -298,6 +290,15 @@ void GpsOdometry::Impl::move_to(const Datum& new_datum, Output& output) {
   frame = std::move(new_frame);
   datum = new_datum;
   admission.turns.restart();
+  projection_is_news = true;
+  tell_projection(output);
+}
+
+/// Of a configured datum, too: with the first IMU sample.
+void GpsOdometry::Impl::tell_projection(Output& output) {
+  if (!datum || !std::exchange(projection_is_news, false)) {
+    return;
+  }
   if (const auto event = projection_event(*frame, config, now_ns)) {
     output.events.push_back(*event);
   }

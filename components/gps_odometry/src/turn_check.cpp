@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace trigpoint::gps_odometry {
 
@@ -18,6 +19,9 @@ constexpr Nanoseconds kYawHistory_ns = 2 * kNanosecondsPerSecond;
 constexpr double kLeg_m = 2.0;
 constexpr double kLegSigmas = 10.0;  // a course good to 0.14 rad
 constexpr Nanoseconds kLongestLeg_ns = 10 * kNanosecondsPerSecond;
+// A quarter turn on the spot to the left and then in reverse is one of the course to the right:
+// what was slower than this since the leg began may have changed gear.
+constexpr double kStands_mps = 0.5;
 constexpr double kReversal_rad = 2.0;  // a change of course that may be a change of gear
 constexpr double kEnough_rad = 1.5 * std::numbers::pi;
 constexpr double kSharedVariance = 0.8;  // of gyro and course, to judge at all
@@ -63,10 +67,14 @@ TurnVerdict TurnCheck::add_fix(Nanoseconds stamp_ns,
                                const Eigen::Vector2d& antenna_map_m,
                                double sigma_m) {
   const auto yaw = yaw_at(stamp_ns);
-  if (!yaw || (last_ && stamp_ns <= last_->stamp_ns)) {
+  if (!yaw || (newest_ && stamp_ns <= newest_->stamp_ns)) {
     return {};
   }
   const Point now{stamp_ns, antenna_map_m, *yaw};
+  const bool stands = newest_ && (antenna_map_m - newest_->antenna_map_m).norm() <
+                                     kStands_mps * to_seconds(stamp_ns - newest_->stamp_ns);
+  has_stood_ = has_stood_ || stands;
+  newest_ = now;
   if (!last_ || stamp_ns - last_->stamp_ns > kLongestLeg_ns) {
     last_ = now;
     leg_.reset();
@@ -79,8 +87,8 @@ TurnVerdict TurnCheck::add_fix(Nanoseconds stamp_ns,
   const Leg leg{std::atan2(step.y(), step.x()), 0.5 * (last_->yaw_rad + *yaw)};
   last_ = now;
   const std::optional<Leg> before = leg_;
-  leg_ = leg;
-  if (!before) {
+  leg_ = std::exchange(has_stood_, false) ? std::nullopt : std::optional(leg);
+  if (!before || !leg_) {
     return {};
   }
   const double course = wrap_angle(leg.course_rad - before->course_rad);

@@ -18,7 +18,8 @@ struct TurnVerdict {
 };
 
 /// Turns of the gyro against turns of the course that fixes show, leg by leg: opposite signs show
-/// after two or three corners. Reversing turns the course round, but not its changes.
+/// after two or three corners. Reversing turns the course round, but not its changes; a change of
+/// gear is left out.
 class TurnCheck {
  public:
   void add_imu(Nanoseconds stamp_ns,
@@ -52,7 +53,9 @@ class TurnCheck {
   std::optional<Nanoseconds> imu_ns_;
   double yaw_rad_{0.0};
   std::deque<Yaw> yaws_;
-  std::optional<Point> last_;
+  std::optional<Point> newest_;
+  std::optional<Point> last_;  ///< where the leg began
+  bool has_stood_{false};      ///< since then
   std::optional<Leg> leg_;
   double turned_rad_{0.0};
   double course_course_{0.0};

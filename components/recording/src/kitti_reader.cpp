@@ -179,6 +179,10 @@ std::unique_ptr<LogReader> open_kitti_drive(const std::filesystem::path& sync_fo
   require(
       options.require_imu, !drive.imu.empty(), sync_folder, "IMU (imu100.csv or oxts/data/*.txt)");
   require(options.require_fix, !drive.fixes.empty(), sync_folder, "fixes (oxts/data/*.txt)");
+  require(options.require_aiding,
+          robot.twist_topic.empty() && robot.yaw_topic.empty(),
+          sync_folder,
+          "wheels and no heading (robot.twist_topic, robot.yaw_topic)");
   return std::make_unique<KittiReader>(std::move(drive), robot, options);
 }
 

@@ -98,6 +98,19 @@ TEST(ClockOffset, refuses_single_fixes_of_another_clock) {
   EXPECT_TRUE(clocks.last.stamp_ns);
 }
 
+TEST(ClockOffset, tells_how_far_a_clock_has_moved_also_over_centuries) {
+  constexpr Nanoseconds kFar_ns = 7'000'000'000 * kNanosecondsPerSecond;
+  ClockOffset offset{Config{}};
+  for (int i = 0; i < 10; ++i) {
+    offset.place(kFar_ns + stamp_of(0.2 * i) - stamp_of(0.0), from_seconds(0.2 * i));
+  }
+  ASSERT_TRUE(offset.is_estimated());
+  const ClockVerdict verdict = offset.place(0, kFar_ns);
+  EXPECT_EQ(verdict.reason, "clock_jump");
+  EXPECT_NE(verdict.text.find("its clock is -14000000000"), std::string::npos) << verdict.text;
+  EXPECT_FALSE(verdict.is_ahead);
+}
+
 TEST(ClockOffset, refuses_a_stamp_that_it_heard_before) {
   Clocks clocks;
   clocks.run(0.0, 5.0, 3600.0);
@@ -178,6 +191,23 @@ TEST_P(Clock, of_both_may_go_back_by_ten_seconds) {
   const double error_m =
       (driven.odometry.T_frame_child.p - driven.truth.at(index).position_map_m).norm();
   EXPECT_LT(error_m, 3.0 * std::sqrt(driven.odometry.pose_covariance.diagonal().head<3>().sum()));
+}
+
+TEST_P(Clock, that_goes_back_takes_no_doubt_of_a_time_to_come_with_it) {
+  Driven driven(GetParam());
+  constexpr double kAway_deg = 50.0 / 111'000.0;
+  for (Input& input : driven.inputs) {
+    // Silent, then somewhere else: followed, and doubted for 30 s.
+    input.fix.latitude_deg += input.available_s > 26.0 ? kAway_deg : 0.0;
+    input.imu.stamp_ns -= input.available_s > 35.0 ? kHour_ns : 0;
+    input.fix.stamp_ns -= input.available_s > 35.0 ? kHour_ns : 0;
+  }
+  driven.advance(35.0, [&](const GnssFix& fix) { return fix.stamp_ns > stamp_of(25.9); });
+  ASSERT_EQ(driven.status.health, GpsHealth::kDegraded);
+  ASSERT_GT(driven.odometry.pose_covariance(1, 1), 100.0) << "doubted";
+  driven.advance(60.0);
+  EXPECT_EQ(driven.status.health, GpsHealth::kOk);
+  EXPECT_LT(driven.odometry.pose_covariance(1, 1), 1.0);
 }
 
 TEST_P(Clock, that_freezes_costs_the_fixes_of_that_time) {

@@ -101,6 +101,39 @@ TEST_P(Places, by_utm_are_the_same_map) {
       kMillimetre);
 }
 
+TEST_P(Places, by_utm_are_told_with_convergence_and_scale_once) {
+  Config utm = config_with_datum(GetParam());
+  utm.projection = "utm";
+  const auto told = [&](const std::string& code) {
+    const Recorded result = driven_with(utm, rtk_robot().robot, [](Input&) {});
+    return std::count_if(result.events.begin(), result.events.end(), [&](const Event& event) {
+      return event.code == code;
+    });
+  };
+  EXPECT_EQ(told("utm_projection"), 1);
+  utm.datum_latitude_deg = 88.0;
+  EXPECT_EQ(told("utm_not_possible"), 1);
+}
+
+/// A datum of a place that the grid of the new one does not reach.
+TEST_P(Places, on_another_side_of_the_world_are_not_taken_for_the_datum) {
+  Config utm;
+  utm.filter = GetParam();
+  utm.projection = "utm";
+  const auto truth = drive(town(1.5, 3.0), 5.0);
+  const auto inputs = sense(truth, rtk_robot(), 6);
+  GpsOdometry filter(utm, rtk_robot().robot);
+  const auto middle = std::find_if(
+      inputs.begin(), inputs.end(), [](const Input& input) { return input.available_s > 1.5; });
+  run(filter, {inputs.begin(), middle}, truth);
+  ASSERT_GT(filter.status().fixes_accepted, 0U);
+  filter.on_datum({0.0, -60.0, 0.0, 1});
+  const Recorded result = run(filter, {middle, inputs.end()}, truth);
+  constexpr double kFar_m = 3e6;
+  ASSERT_FALSE(result.odometry.empty());
+  EXPECT_GT(result.odometry.front().T_frame_child.p.norm(), kFar_m);
+}
+
 TEST_P(Places, too_far_from_the_datum_are_refused_and_publish_nothing) {
   Config far = config_with_datum(GetParam());
   far.datum_latitude_deg += 1.0;

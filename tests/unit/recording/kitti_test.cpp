@@ -92,6 +92,16 @@ TEST(KittiDrive, takes_only_sweeps_whose_points_are_there) {
   EXPECT_EQ(200 * kMillisecond_ns, clouds[1].stamp_ns - clouds[0].stamp_ns);
 }
 
+TEST(KittiDrive, is_refused_where_wheels_or_a_heading_are_wanted_unless_told_otherwise) {
+  SmallDrive drive;
+  RobotConfig robot;
+  robot.yaw_topic = "heading";
+  EXPECT_THROW(open_log(drive.path(), robot), LogError);
+  LogOptions lenient;
+  lenient.require_aiding = false;
+  EXPECT_NO_THROW(open_log(drive.path(), robot, lenient));
+}
+
 TEST(KittiDrive, turns_beams_upwards_when_their_elevation_is_known_to_be_too_low) {
   SmallDrive drive;
   LogOptions options;
