@@ -10,6 +10,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -72,6 +73,14 @@ class SurfelMap final : public LocalMap {
     std::array<ParentId, kLeaves> neighbours{};
   };
 
+  struct NearPoint {
+    double distance2_m2{std::numeric_limits<double>::infinity()};
+    Eigen::Vector3d offset_m{Eigen::Vector3d::Zero()};
+  };
+
+  static constexpr int kNearestPoints = 5;
+  using NearestPoints = std::array<NearPoint, kNearestPoints>;
+
   enum State : std::uint32_t { kDirty, kFitting, kPlane, kNoPlane };
 
   /// One cache line; apart from Parent because a match reads this and little else.
@@ -113,10 +122,12 @@ class SurfelMap final : public LocalMap {
 
   std::array<ParentId, 8> candidates(const Eigen::Vector3d& point_odom_m) const;
   const Surfel* surfel(ParentId id, Surfel& scratch) const;
-  bool match_nearest_points(const Eigen::Vector3d& point_odom_m,
-                            const std::array<ParentId, 8>& parents,
-                            PlaneMatch& plane) const;
+  void offer_points(const Parent& parent,
+                    const Eigen::Vector3d& point_odom_m,
+                    NearestPoints& nearest) const;
+  bool match_nearest_points(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) const;
   Surfel fit(const Parent& parent) const;
+  bool is_surface(const Parent& parent, const PlaneFit& plane) const;
   Window window_of(const Parent& parent) const;
   std::optional<PlaneFit> plane_of(const Window& window) const;
   std::optional<PlaneFit> flat_fit(const Moments& moments) const;

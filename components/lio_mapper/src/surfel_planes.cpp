@@ -28,14 +28,18 @@ constexpr int kMinOwnLeaves = 3;
 /// (0.4 m of 1.5 m).
 constexpr double kFaceReach = 0.4 / 1.5;
 
+/// A plane is a surface when this share of the points near it lie on it; foliage of a crown has
+/// less than half.
+constexpr double kOnPlane_m = 0.1;
+constexpr double kSurfaceShare = 0.8;
+
 /// Of two planes that both explain a point, the distance to the plane counts this much more than
 /// the distance along it: else a point beside a corner may be given to the wall it does not lie on.
 constexpr double kAcrossWeight2 = 9.0;
 
 /// Where no plane holds: this many points, the farthest within so many sides of a leaf, none
 /// farther from their plane, and no line.
-constexpr int kNearestPoints = 5;
-constexpr double kNearestReach = 2.0;
+constexpr double kNearestReach = 3.0;  // as far as the neighbouring parents surely hold them all
 constexpr double kNearestPlane_m = 0.1;
 constexpr double kLeastNearLinearity = 0.01;
 
@@ -103,36 +107,44 @@ bool SurfelMap::match(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) co
     }
   }
   return std::isfinite(least_cost) ||
-         (config_.nearest_points && match_nearest_points(point_odom_m, parents, plane));
+         (config_.nearest_points && match_nearest_points(point_odom_m, plane));
+}
+
+/// Offsets from a query, nearest first.
+void SurfelMap::offer_points(const Parent& parent,
+                             const Eigen::Vector3d& point_odom_m,
+                             NearestPoints& nearest) const {
+  const Eigen::Vector3d origin = centre_of(parent) - point_odom_m;
+  const double beyond_m = (origin.cwiseAbs().array() - 0.5 * parent_m_).max(0.0).matrix().norm();
+  if (beyond_m * beyond_m > nearest.back().distance2_m2) {
+    return;
+  }
+  for (std::uint32_t left = parent.occupied; left != 0; left &= left - 1) {
+    const auto leaf = static_cast<std::size_t>(std::countr_zero(left));
+    NearPoint candidate{0.0, origin + local(parent.points[leaf])};
+    candidate.distance2_m2 = candidate.offset_m.squaredNorm();
+    for (NearPoint& place : nearest) {
+      if (candidate.distance2_m2 < place.distance2_m2) {
+        std::swap(candidate, place);
+      }
+    }
+  }
 }
 
 /// Where no plane holds, as in foliage: FAST-LIO2's plane through the five nearest points, of those
 /// that the leaves keep. Their means would not do: in a crown they lie at the leaves' centres and
 /// tell nothing of its shape.
-bool SurfelMap::match_nearest_points(const Eigen::Vector3d& point_odom_m,
-                                     const std::array<ParentId, 8>& parents,
-                                     PlaneMatch& plane) const {
-  struct Near {
-    double distance2_m2{std::numeric_limits<double>::infinity()};
-    Eigen::Vector3d offset_m{Eigen::Vector3d::Zero()};  ///< from the point
-  };
-
-  std::array<Near, kNearestPoints> nearest{};
-  for (const ParentId id : parents) {
-    if (id == kNoParent) {
-      continue;
-    }
-    const Parent& parent = parents_[static_cast<std::size_t>(id)];
-    const Eigen::Vector3d origin = centre_of(parent) - point_odom_m;
-    for (std::uint32_t left = parent.occupied; left != 0; left &= left - 1) {
-      const auto leaf = static_cast<std::size_t>(std::countr_zero(left));
-      Near candidate{0.0, origin + local(parent.points[leaf])};
-      candidate.distance2_m2 = candidate.offset_m.squaredNorm();
-      for (Near& slot : nearest) {
-        if (candidate.distance2_m2 < slot.distance2_m2) {
-          std::swap(candidate, slot);
-        }
-      }
+bool SurfelMap::match_nearest_points(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) const {
+  const Eigen::Vector3d cells = point_odom_m * inverse_parent_per_m_;
+  const VoxelIndex home = voxel_index(cells.x(), cells.y(), cells.z(), 1.0);
+  const ParentId own = find(home);
+  NearestPoints nearest{};
+  for (int direction = 0; direction < kLeaves; ++direction) {
+    const ParentId id = own == kNoParent ? find(neighbour_index(home, direction))
+                                         : parents_[static_cast<std::size_t>(own)]
+                                               .neighbours[static_cast<std::size_t>(direction)];
+    if (id != kNoParent) {
+      offer_points(parents_[static_cast<std::size_t>(id)], point_odom_m, nearest);
     }
   }
   const double farthest_m = kNearestReach * config_.leaf_m;
@@ -140,7 +152,7 @@ bool SurfelMap::match_nearest_points(const Eigen::Vector3d& point_odom_m,
     return false;
   }
   Moments moments;
-  for (const Near& near : nearest) {
+  for (const NearPoint& near : nearest) {
     moments.add(near.offset_m);
   }
   const auto fit = fit_plane(moments);
@@ -148,7 +160,7 @@ bool SurfelMap::match_nearest_points(const Eigen::Vector3d& point_odom_m,
       std::abs(fit->normal.dot(fit->centroid)) > config_.max_residual_m) {
     return false;
   }
-  for (const Near& near : nearest) {
+  for (const NearPoint& near : nearest) {
     if (std::abs(fit->normal.dot(near.offset_m - fit->centroid)) > kNearestPlane_m) {
       return false;
     }
@@ -221,13 +233,26 @@ SurfelMap::Surfel SurfelMap::fit(const Parent& parent) const {
   if (std::popcount(parent.occupied) < kMinOwnLeaves) {
     return result;
   }
-  if (const auto plane = plane_of(window_of(parent))) {
+  const auto plane = plane_of(window_of(parent));
+  if (plane && is_surface(parent, *plane)) {
     result.normal = plane->normal;
     result.centroid_odom_m = plane->centroid + centre_of(parent);
     result.thickness2_m2 = plane->eigenvalues[0] + kThicknessFloor2_m2;
     result.state = kPlane;
   }
   return result;
+}
+
+/// Leaf means are smoother than what they are means of: in a crown some always lie on a plane by
+/// chance, and points that match it would only confirm the prediction. Single points tell.
+bool SurfelMap::is_surface(const Parent& parent, const PlaneFit& plane) const {
+  int on_plane = 0;
+  for (std::uint32_t left = parent.occupied; left != 0; left &= left - 1) {
+    const auto leaf = static_cast<std::size_t>(std::countr_zero(left));
+    const double distance_m = plane.normal.dot(local(parent.points[leaf]) - plane.centroid);
+    on_plane += std::abs(distance_m) < kOnPlane_m ? 1 : 0;
+  }
+  return on_plane >= kSurfaceShare * std::popcount(parent.occupied);
 }
 
 SurfelMap::Window SurfelMap::window_of(const Parent& parent) const {

@@ -34,7 +34,7 @@ struct SurfelMapConfig {
   double max_flatness{0.03};      ///< smallest over largest eigenvalue of a plane's leaf means
   double min_linearity{0.1};      ///< middle over largest eigenvalue, so that a line is no plane
   double max_residual_m{0.5};     ///< farther planes do not explain a point
-  bool nearest_points{false};     ///< where no plane holds: one through five points
+  bool nearest_points{true};      ///< where no plane holds: one through five points
 };
 
 struct IkdMapConfig {
