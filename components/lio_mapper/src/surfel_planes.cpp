@@ -31,7 +31,7 @@ constexpr double kFaceReach = 0.4 / 1.5;
 /// A plane is a surface when this share of the points near it lie on it; foliage of a crown has
 /// less than half.
 constexpr double kOnPlane_m = 0.1;
-constexpr double kSurfaceShare = 0.8;
+constexpr double kSurfaceShare = 0.95;
 
 /// Of two planes that both explain a point, the distance to the plane counts this much more than
 /// the distance along it: else a point beside a corner may be given to the wall it does not lie on.
