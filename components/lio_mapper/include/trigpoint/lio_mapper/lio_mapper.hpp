@@ -6,6 +6,7 @@
 #include "trigpoint/base/measurements.hpp"
 #include "trigpoint/base/messages.hpp"
 #include "trigpoint/base/robot.hpp"
+#include "trigpoint/lio_mapper/checkpoint.hpp"
 #include "trigpoint/lio_mapper/config.hpp"
 #include "trigpoint/lio_mapper/stages.hpp"
 
