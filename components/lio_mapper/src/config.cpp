@@ -179,6 +179,10 @@ void describe_recovery(RecoveryConfig& c, ConfigFields& f) {
            c.min_share,
            "of the points that stand out of the ground, within 10 cm of the map",
            {0.0, 1.0});
+  f.number("min_fit",
+           c.min_fit,
+           "the same of those of them that meet a plane of the map: sparse maps have gaps",
+           {0.0, 1.0});
   f.number("min_lead", c.min_lead, "of that share over any other place", {0.0, 1.0});
   f.integer("attempts",
             c.attempts,

@@ -26,7 +26,7 @@ constexpr double kNear_m = 25.0;       // farther points would fall through the 
 constexpr double kSeen_m = 0.5;        // a point this far from its plane counts nothing
 constexpr double kGroundRadius_m = 12.0;
 constexpr double kStandsOut_m = 0.5;  // above the ground
-constexpr std::size_t kCoarsePoints = 250;
+constexpr std::size_t kCoarsePoints = 150;
 constexpr std::size_t kFinePoints = 1500;
 constexpr std::size_t kFewestPoints = 80;
 constexpr std::size_t kRefined = 16;
@@ -224,28 +224,32 @@ void judge(const Parts& parts,
     ++matched;
     chi2 += std::min(r * r / variance, 25.0);  // one wild point is no verdict
   }
-  registration.share = static_cast<double>(near) /
-                       static_cast<double>(std::max<std::size_t>(1, parts.tall_level_m.size()));
+  const auto share_of = [](std::size_t part, std::size_t all) {
+    return static_cast<double>(part) / static_cast<double>(std::max<std::size_t>(1, all));
+  };
+  registration.share = share_of(near, parts.tall_level_m.size());
+  registration.fit = share_of(near, matched);
   registration.chi2 = chi2 / static_cast<double>(std::max<std::size_t>(1, matched));
-}
-
-std::string percent_text(const char* format, double a, double b) {
-  char text[160];
-  std::snprintf(text, sizeof text, format, 100.0 * a, 100.0 * b);
-  return text;
 }
 
 /// Empty when nothing speaks against it.
 std::string obstacle_to(const Registration& best, const RecoveryConfig& config) {
-  if (best.share < config.min_share) {
-    return percent_text("%.0f %% of what stands out lies on the map, at least %.0f %% needed",
-                        best.share,
-                        config.min_share);
-  }
-  if (best.share - best.runner_up_share < config.min_lead) {
-    return percent_text("two places explain the scan: %.0f %% and %.0f %% of what stands out",
-                        best.share,
-                        best.runner_up_share);
+  const bool covered = best.share >= config.min_share;
+  const bool fits = best.fit >= config.min_fit;
+  const bool leads = best.share - best.runner_up_share >= config.min_lead;
+  if (!covered || !fits || !leads) {
+    char text[240];
+    std::snprintf(text,
+                  sizeof text,
+                  "%.0f %% of what stands out lies on the map (at least %.0f needed), which is "
+                  "%.0f %% of what meets a plane (%.0f), and %.0f %% at another place (%.0f less)",
+                  100.0 * best.share,
+                  100.0 * config.min_share,
+                  100.0 * best.fit,
+                  100.0 * config.min_fit,
+                  100.0 * best.runner_up_share,
+                  100.0 * config.min_lead);
+    return text;
   }
   if (best.chi2 > kMostChi2) {
     return "residuals are " + std::to_string(best.chi2) + " times as large as their noise";
