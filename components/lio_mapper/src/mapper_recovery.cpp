@@ -73,8 +73,14 @@ void LioMapper::resume(const Checkpoint& checkpoint,
                        const ResumeOptions& options) {
   Impl& impl = *impl_;
   set_status(checkpoint, impl.status);
-  impl.refused_scans.set(checkpoint.scans_refused);
-  impl.imu_received_before = checkpoint.imu_received;
+  if (options.frozen_map) {  // a run of its own, which counts for itself
+    LioStatus& s = impl.status;
+    s.scans_received = s.scans_used = s.imu_received = s.rows_applied = s.rows_refused = 0;
+    s.scans_refused.clear();
+  } else {
+    impl.refused_scans.set(checkpoint.scans_refused);
+    impl.imu_received_before = checkpoint.imu_received;
+  }
   impl.next_keyframe = checkpoint.next_keyframe;
   impl.stored_points = options.frozen_map ? points : nullptr;
   impl.resumption.emplace(impl.config, checkpoint, std::move(points), options);

@@ -193,6 +193,7 @@ std::optional<Resumption::Found> Resumption::attempt(const StartResult& start,
   const Gathered gathered = gather(config_, start.initial, T_base_lidar, imu, sweeps);
   const LevelScan scan{gathered.points_base, without_yaw(gathered.T_new_base.q), T_base_lidar.p};
   Workers workers(static_cast<std::size_t>(config_.matching.threads));
+  obstacle_.clear();
   for (const SearchArea& area : areas(sweeps.front().end_ns)) {
     auto map = load_map(config_.local_map,
                         points_,
@@ -205,7 +206,7 @@ std::optional<Resumption::Found> Resumption::attempt(const StartResult& start,
       const Pose T_old_new = result.best->T_odom_base * gathered.T_new_base.inverse();
       return compose(start, T_old_new, *result.best, std::move(map));
     }
-    obstacle_ = result.obstacle;
+    obstacle_ += (obstacle_.empty() ? "" : "; elsewhere: ") + result.obstacle;
   }
   return std::nullopt;
 }
