@@ -220,16 +220,18 @@ void judge(const Parts& parts,
     const double sideways_m = matching.angle_sigma_rad * range_m;
     const double variance = matching.range_sigma_m * matching.range_sigma_m +
                             sideways_m * sideways_m + plane.thickness2_m2;
-    near += std::abs(r) < kOnPlane_m ? 1 : 0;
     ++matched;
-    chi2 += std::min(r * r / variance, 25.0);  // one wild point is no verdict
+    if (std::abs(r) < kOnPlane_m) {  // what lies farther off speaks against the fit already
+      ++near;
+      chi2 += r * r / variance;
+    }
   }
   const auto share_of = [](std::size_t part, std::size_t all) {
     return static_cast<double>(part) / static_cast<double>(std::max<std::size_t>(1, all));
   };
   registration.share = share_of(near, parts.tall_level_m.size());
   registration.fit = share_of(near, matched);
-  registration.chi2 = chi2 / static_cast<double>(std::max<std::size_t>(1, matched));
+  registration.chi2 = chi2 / static_cast<double>(std::max<std::size_t>(1, near));
 }
 
 /// Empty when nothing speaks against it.

@@ -38,7 +38,7 @@ struct Registration {
   double share{0.0};            ///< of the points that stand out, within 10 cm of their planes
   double fit{0.0};              ///< of those that meet a plane at all, within 10 cm of it
   double runner_up_share{0.0};  ///< of the best place that is another one
-  double chi2{0.0};             ///< per point that stands out and matches; near 1 when all is well
+  double chi2{0.0};             ///< per point that lies within 10 cm; near 1 when all is well
   Pose nearest_centre;          ///< of the search area
 };
 
