@@ -15,6 +15,8 @@
 #include <algorithm>
 #include <iostream>
 #include <memory>
+#include <optional>
+#include <utility>
 
 namespace trigpoint::cli {
 
@@ -23,7 +25,65 @@ namespace {
 struct MapOptions {
   InputOptions input;
   std::string out;
+  std::string localize;  ///< a session whose map is used as it is
+  std::string resume;    ///< a session that is continued
 };
+
+/// Throws ConfigError when the options contradict each other or `out` holds something already.
+void check(MapOptions& options) {
+  if (!options.resume.empty()) {
+    if (!options.out.empty() || !options.localize.empty()) {
+      throw ConfigError("--resume goes on in its session's folder: leave out --out and --localize");
+    }
+    options.out = options.resume;
+    return;
+  }
+  if (options.out.empty()) {
+    throw ConfigError("--out is missing: the folder for the session");
+  }
+  refuse_used_folder(options.out);
+}
+
+pipeline::UseOfStored use_of(const MapOptions& options) {
+  return !options.resume.empty()     ? pipeline::UseOfStored::kResume
+         : !options.localize.empty() ? pipeline::UseOfStored::kLocalize
+                                     : pipeline::UseOfStored::kNothing;
+}
+
+std::optional<pipeline::StoredSession> stored_of(const MapOptions& options) {
+  const std::string& session = options.resume.empty() ? options.localize : options.resume;
+  return session.empty() ? std::nullopt : std::optional(pipeline::open_stored_session(session));
+}
+
+/// The stored map lies about its own datum.
+void keep_datum(const std::optional<Datum>& datum, gps_odometry::Config& gps) {
+  if (!datum) {
+    return;
+  }
+  Datum configured;
+  configured.latitude_deg = gps.datum_latitude_deg;
+  configured.longitude_deg = gps.datum_longitude_deg;
+  configured.height_m = gps.datum_height_m;
+  if (gps.use_configured_datum && configured.id() != datum->id()) {
+    throw ConfigError("the configured datum " + configured.id() +
+                      " is not that of the stored session, " + datum->id());
+  }
+  gps.use_configured_datum = true;
+  gps.datum_latitude_deg = datum->latitude_deg;
+  gps.datum_longitude_deg = datum->longitude_deg;
+  gps.datum_height_m = datum->height_m;
+}
+
+/// Stamps of a session grow.
+void refuse_older_log(const MapOptions& options,
+                      const pipeline::StoredSession& stored,
+                      const recording::LogSummary& log) {
+  if (!options.resume.empty() && log.first_ns != 0 && log.first_ns < stored.checkpoint.stamp_ns) {
+    throw ConfigError("--resume: " + log.path + " begins " +
+                      std::to_string(to_seconds(stored.checkpoint.stamp_ns - log.first_ns)) +
+                      " s before the session ends; only a later log can go on from it");
+  }
+}
 
 int exit_code_of(const pipeline::MapLogResult& result) {
   if (!result.log_error.empty()) {
@@ -42,8 +102,9 @@ int exit_code_of(const pipeline::MapLogResult& result) {
   return 0;
 }
 
-/// `refused_imu` becomes the sentence of an IMU that was refused for good while it ran.
-pipeline::MapLogResult map(const MapOptions& options, std::string& refused_imu) {
+/// `refused_imu` becomes the sentence of an IMU that was refused for good while it ran;
+/// `not_resumed` tells that the robot was not found in the stored map.
+pipeline::MapLogResult map(const MapOptions& options, std::string& refused_imu, bool& not_resumed) {
   const shell::StopSignal stop;
   const shell::EventLog log("map");
   ToldOnce events([&](const Event& event) {
@@ -51,9 +112,15 @@ pipeline::MapLogResult map(const MapOptions& options, std::string& refused_imu) 
     if (event.code == "imu_gyro_in_degrees") {
       refused_imu = event.text;
     }
+    not_resumed = not_resumed || event.code == "lio_not_resumed";
   });
+  std::optional<pipeline::StoredSession> stored = stored_of(options);
   Input input =
       open_input(options.input, exporter::path_in(options.out, exporter::session_file::kTruth));
+  if (stored) {
+    keep_datum(stored->datum, input.config.cores.gps_odometry);
+    refuse_older_log(options, *stored, input.reader->summary());
+  }
   pipeline::MapLogResult result;
   {
     Progress progress("mapping");
@@ -64,16 +131,19 @@ pipeline::MapLogResult map(const MapOptions& options, std::string& refused_imu) 
                                 mode_of(input.config),
                                 [&](double share) { progress(share); },
                                 [&](const Event& event) { events(event); },
-                                [&] { return stop.requested(); }});
+                                [&] { return stop.requested(); },
+                                use_of(options),
+                                std::move(stored)});
   }
   std::cerr << events.summary();
   return result;
 }
 
-int run(const MapOptions& options) {
-  refuse_used_folder(options.out);
+int run(MapOptions& options) {
+  check(options);
   std::string refused_imu;
-  const pipeline::MapLogResult result = map(options, refused_imu);
+  bool not_resumed = false;
+  const pipeline::MapLogResult result = map(options, refused_imu, not_resumed);
   if (result.stopped) {
     std::cerr << "trigpoint map: interrupted after " << result.data_s
               << " s of the log; what was done so far is kept in " << options.out
@@ -91,6 +161,11 @@ int run(const MapOptions& options) {
     std::cerr << "trigpoint map: " << refused_imu << ". What came before is of no use either\n";
     return 1;
   }
+  if (not_resumed) {
+    std::cerr << "trigpoint map: the robot was not found in the stored map; what came out is a map "
+                 "of its own, in a new odom epoch\n";
+    return 1;
+  }
   return std::max(exit_code_of(result), finished);
 }
 
@@ -102,7 +177,19 @@ void add_map(CLI::App& app, Chosen& chosen) {
                                       "trajectories and report, bit-identical on every run");
   const auto options = std::make_shared<MapOptions>();
   add_input_options(*verb, options->input);
-  verb->add_option("--out", options->out, "session folder, created when missing")->required();
+  verb->add_option("--out", options->out, "session folder, created when missing");
+  verb->add_option(
+          "--localize",
+          options->localize,
+          "a stored session whose map is used and not changed: the robot is looked for near "
+          "the session's first and last place; the result, without a map, goes to --out")
+      ->check(CLI::ExistingDirectory);
+  verb->add_option(
+          "--resume",
+          options->resume,
+          "a stored session that goes on with this log, near its last or first place: same "
+          "odom, map and datum, keyframes and trajectories appended; instead of --out")
+      ->check(CLI::ExistingDirectory);
   verb->callback([options, &chosen] { chosen = [options] { return run(*options); }; });
 }
 

@@ -71,7 +71,7 @@ class Process {
         diagnostics_(participant_, topics::diagnostics) {
     if (!options.session.empty()) {
       exporter::create_session_folder(options.session);
-      session_.emplace(options.session);
+      open_session(options.session);
     }
     publish_extrinsics(settings.robot);
     updates_.emplace(
@@ -103,13 +103,26 @@ class Process {
   /// After the loop: what still waits for IMU samples is processed and written.
   void close() {
     take([this] { return core_.finish(); });
-    keep([&] { session_->close(core_.status()); });
+    keep([&] { session_->close(core_.status(), core_.checkpoint(), core_.take_rows()); });
     publish_map();
   }
 
   bool failed() const { return disk_.failed(); }
 
  private:
+  /// A session that holds a checkpoint is one in which this program died or was stopped: it goes
+  /// on.
+  void open_session(const std::string& session) {
+    const bool goes_on = pipeline::stored_checkpoint(session).has_value();
+    if (goes_on) {
+      pipeline::StoredSession stored = pipeline::open_stored_session(session);
+      last_.stamp_ns = stored.checkpoint.stamp_ns;
+      core_.resume(stored.checkpoint, std::move(stored.points));
+      log_.info("going on with the session in " + session);
+    }
+    session_.emplace(session, goes_on ? pipeline::Continuing::kYes : pipeline::Continuing::kNo);
+  }
+
   template <typename Feed>
   void take(Feed feed) {
     const Clock::time_point before = Clock::now();

@@ -172,6 +172,28 @@ void describe_keyframes(KeyframeConfig& c, ConfigFields& f) {
   f.number("voxel_m", c.voxel_m, "side of the voxels that thin a keyframe's cloud", kPositive);
 }
 
+void describe_recovery(RecoveryConfig& c, ConfigFields& f) {
+  f.number("radius_m", c.radius_m, "farthest from the predicted place", kPositive);
+  f.number("yaw_rad", c.yaw_rad, "farthest from the predicted heading", {0.0, 3.1416});
+  f.number("min_share",
+           c.min_share,
+           "of the points that stand out of the ground, within 10 cm of the map",
+           {0.0, 1.0});
+  f.number("min_fit",
+           c.min_fit,
+           "the same of those of them that meet a plane of the map: sparse maps have gaps",
+           {0.0, 1.0});
+  f.number("min_lead", c.min_lead, "of that share over any other place", {0.0, 1.0});
+  f.integer("attempts",
+            c.attempts,
+            "of a restart, on more and more sweeps, before odom begins anew",
+            {1, 4});
+  f.number("give_up_s",
+           c.give_up_s,
+           "of a lost track while sweeps are usable, before odom begins anew",
+           kPositive);
+}
+
 }  // namespace
 
 void describe(Config& config, ConfigFields& fields) {
@@ -216,6 +238,9 @@ void describe(Config& config, ConfigFields& fields) {
   fields.section("keyframes", "what is kept for the saved map", [&](ConfigFields& f) {
     describe_keyframes(config.keyframes, f);
   });
+  fields.section("recovery",
+                 "finding the place in the map again after a restart or a lost track",
+                 [&](ConfigFields& f) { describe_recovery(config.recovery, f); });
   fields.number("imu_rate_odometry_hz",
                 config.imu_rate_odometry_hz,
                 "highest rate of lio/odometry_imu_rate",

@@ -20,6 +20,9 @@ class Tally {
  public:
   void add(const std::string& reason);
 
+  /// Goes on from the counts of an earlier run.
+  void set(const std::vector<NamedCount>& counts) { counts_ = counts; }
+
   const std::vector<NamedCount>& counts() const { return counts_; }
 
  private:

@@ -5,17 +5,13 @@
 #include "trigpoint/base/config.hpp"
 #include "trigpoint/base/so3.hpp"
 
+#include "checkpoint_of.hpp"
 #include "downsample.hpp"
-#include "imu_buffer.hpp"
-#include "imu_intake.hpp"
-#include "imu_rate_odometry.hpp"
-#include "keyframe_trigger.hpp"
-#include "scan_filter.hpp"
-#include "start_up.hpp"
-#include "sweep.hpp"
+#include "mapper_impl.hpp"
 
 #include <cmath>
 #include <deque>
+#include <utility>
 
 namespace trigpoint::lio_mapper {
 
@@ -53,58 +49,6 @@ const Config& checked(const Config& config) {
 }
 
 }  // namespace
-
-struct LioMapper::Impl {
-  Impl(const Config& config_in, const RobotConfig& robot)
-      : config(checked(config_in)),
-        T_base_lidar(robot.T_base_lidar()),
-        decoder(config.sweep),
-        intake(robot.q_base_imu()),
-        imu_rate(config.imu, config.imu_rate_odometry_hz),
-        keyframe_trigger(config.keyframes) {}
-
-  void begin_stage(Stage stage) const {
-    if (observe) {
-      observe(stage);
-    }
-  }
-
-  void queue(Sweep sweep, Output& output);
-  void process_what_is_covered(Output& output);
-  void start_when_possible(Output& output);
-  void begin(Output& output);
-  void process_front(Output& output);
-  void refuse_front(const std::string& reason, const std::string& text, Output& output);
-  void refuse_sweep(const std::string& reason,
-                    Nanoseconds stamp_ns,
-                    const std::string& text,
-                    Output& output);
-  std::optional<std::string> objection_to(const Sweep& sweep) const;
-  void apply_rows(const StateUpdate& update, Output& output);
-  void align(const Alignment& alignment, Nanoseconds stamp_ns, Output& output);
-  void count_row(const StateUpdate& update, const RowVerdict& verdict, Output& output);
-  void judge_health(const ScanOutcome& outcome, Nanoseconds stamp_ns, Output& output);
-  void report(const ScanOutcome& outcome, Output& output);
-  Keyframe make_keyframe(const ScanOutcome& outcome, const Odometry& odometry);
-  void refresh_status();
-
-  Config config;
-  Pose T_base_lidar;
-  SweepDecoder decoder;
-  ImuIntake intake;
-  ImuBuffer imu;
-  std::deque<Sweep> sweeps;
-  std::optional<ScanFilter> filter;
-  ImuRateOdometry imu_rate;
-  KeyframeTrigger keyframe_trigger;
-  std::uint64_t next_keyframe{0};
-  LioStatus status;
-  Tally refused_scans;
-  Nanoseconds newest_sweep_ns{0};
-  Nanoseconds last_used_ns{0};
-  Nanoseconds trouble_told_ns{0};
-  StageObserver observe;
-};
 
 void LioMapper::Impl::refuse_sweep(const std::string& reason,
                                    Nanoseconds stamp_ns,
@@ -177,6 +121,9 @@ void LioMapper::Impl::start_when_possible(Output& output) {
 }
 
 void LioMapper::Impl::begin(Output& output) {
+  if (resumption && !resumption->is_due(sweeps.size())) {
+    return;
+  }
   const StartResult result = start(config, T_base_lidar, imu, sweeps);
   if (result.trouble) {
     if (to_seconds(imu.newest_ns() - trouble_told_ns) > 1.0) {
@@ -184,6 +131,9 @@ void LioMapper::Impl::begin(Output& output) {
       trouble_told_ns = imu.newest_ns();
     }
     refuse_front("imu_implausible", result.trouble->text, output);
+    return;
+  }
+  if (resumption && (resume_from(result, output) || resumption)) {
     return;
   }
   filter.emplace(config, T_base_lidar, result.initial, [this](Stage stage) { begin_stage(stage); });
@@ -213,11 +163,23 @@ void LioMapper::Impl::process_front(Output& output) {
     refuse_front(*reason, "refused a sweep that the IMU does not cover", output);
     return;
   }
-  const ScanOutcome outcome = filter->process(sweep, imu);
+  const ScanOutcome outcome = filter->process(
+      sweep, imu, lost_track.search_for(*filter, T_base_lidar.p, sweep.end_ns, last_used_ns));
+  if (const auto event = lost_track.conclude(outcome, sweep.end_ns)) {
+    output.events.push_back(*event);
+    if (!lost_track.is_searching()) {
+      ++status.reset.counter;
+      status.reset.delta = lost_track.delta();
+    }
+  }
+  if (lost_track.must_begin_anew(sweep.end_ns)) {
+    begin_epoch_anew("lio_not_recovered", "the track was lost and not found again", output);
+    return;
+  }
   for (const StateUpdate& update : filter->take_covered()) {
     count_row(update, filter->apply(update), output);
   }
-  filter->insert(outcome);
+  update_map(outcome);
   begin_stage(Stage::kReport);
   judge_health(outcome, sweep.end_ns, output);
   report(outcome, output);
@@ -257,7 +219,7 @@ void LioMapper::Impl::judge_health(const ScanOutcome& outcome,
 }
 
 void LioMapper::Impl::refresh_status() {
-  status.imu_received = intake.received();
+  status.imu_received = imu_received_before + intake.received();
   status.scans_refused = refused_scans.counts();
   if (!filter) {
     return;
@@ -308,9 +270,12 @@ void LioMapper::Impl::report(const ScanOutcome& outcome, Output& output) {
     const Eigen::Vector3f p = R * point.position() + t;
     result.points_odom.push_back({p.x(), p.y(), p.z(), point.intensity});
   }
-  if (outcome.used && keyframe_trigger.fires(filter->stamp_ns(), state.T_odom_base)) {
+  if (outcome.used && !stored_points &&
+      keyframe_trigger.fires(filter->stamp_ns(), state.T_odom_base)) {
     result.keyframe = make_keyframe(outcome, result.odometry);
   }
+  result.checkpoint = checkpoint_of(*filter, status, next_keyframe);
+  result.rows = std::exchange(rows_decided, {});
   output.scans.push_back(std::move(result));
 }
 
@@ -334,6 +299,12 @@ void LioMapper::Impl::align(const Alignment& alignment, Nanoseconds stamp_ns, Ou
 void LioMapper::Impl::count_row(const StateUpdate& update,
                                 const RowVerdict& verdict,
                                 Output& output) {
+  if (verdict.outcome != RowOutcome::kWaits) {
+    const bool applied = verdict.outcome == RowOutcome::kApplied;
+    rows_decided.push_back(
+        {update, status.odom_epoch, applied, applied ? "applied" : verdict.reason});
+    rows_decided.back().update.first_alignment.reset();
+  }
   if (verdict.outcome == RowOutcome::kApplied) {
     ++status.rows_applied;
     status.last_row_fix_ns = update.fix_stamp_ns;
@@ -370,7 +341,7 @@ void LioMapper::Impl::apply_rows(const StateUpdate& update, Output& output) {
 }
 
 LioMapper::LioMapper(const Config& config, const RobotConfig& robot)
-    : impl_(std::make_unique<Impl>(config, robot)) {}
+    : impl_(std::make_unique<Impl>(checked(config), robot)) {}
 
 LioMapper::~LioMapper() = default;
 

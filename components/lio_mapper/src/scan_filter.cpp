@@ -23,20 +23,11 @@ namespace {
 constexpr double kLongestStep_s = 0.02;
 /// Less motion between two scans is jitter of the estimate.
 constexpr double kLeastMotion_m = 0.005;
+/// Of a pose that a search found, before the scan is matched there.
+constexpr double kFoundPosition_m = 0.1;
+constexpr double kFoundRotation_rad = 0.01;
 /// A scan is put into the map unmatched only while its pose relative to the map is this certain.
 constexpr double kMapSigma_m = 0.3;
-
-PointCloud transformed(const PointCloud& points, const Pose& T) {
-  const Eigen::Matrix3f R = T.q.toRotationMatrix().cast<float>();
-  const Eigen::Vector3f t = T.p.cast<float>();
-  PointCloud moved;
-  moved.reserve(points.size());
-  for (const PointXyzi& point : points) {
-    const Eigen::Vector3f p = R * point.position() + t;
-    moved.push_back({p.x(), p.y(), p.z(), point.intensity});
-  }
-  return moved;
-}
 
 IterationLimits limits_of(const MatchingConfig& config) {
   return {config.max_iterations,
@@ -55,6 +46,18 @@ Eigen::Matrix<double, 6, 4> pose_by_transform(double yaw_rad, const Vector3d& p_
 }
 
 }  // namespace
+
+PointCloud transformed(const PointCloud& points, const Pose& T) {
+  const Eigen::Matrix3f R = T.q.toRotationMatrix().cast<float>();
+  const Eigen::Vector3f t = T.p.cast<float>();
+  PointCloud moved;
+  moved.reserve(points.size());
+  for (const PointXyzi& point : points) {
+    const Eigen::Vector3f p = R * point.position() + t;
+    moved.push_back({p.x(), p.y(), p.z(), point.intensity});
+  }
+  return moved;
+}
 
 Matrix4d drift_noise(const DriftConfig& drift,
                      double distance_m,
@@ -174,7 +177,48 @@ void ScanFilter::begin(Stage stage) const {
   }
 }
 
-ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu) {
+void ScanFilter::take_over(Past past) {
+  aligned_ = past.aligned;
+  distance_m_ = past.distance_m;
+  drift_covariance_ = past.drift_covariance;
+  map_ = std::move(past.map);
+  pruned_at_m_ = state().T_odom_base.p;
+}
+
+bool ScanFilter::search(const PoseSearch& look,
+                        const PointCloud& thinned_base,
+                        Prediction& prediction) const {
+  const Sighting sighting = look(prediction.state, prediction.covariance, thinned_base);
+  if (sighting.match_as_usual || !sighting.T_odom_base) {
+    return sighting.match_as_usual;
+  }
+  const Pose& found = *sighting.T_odom_base;
+  // An ordinary measurement of the whole pose: the cross-covariances that grew while the IMU was
+  // alone correct velocity and biases with it. d Log(R_found^T R exp(e)) / de = J_r^-1.
+  const UpdateResult result = iterated_update(
+      prediction.state,
+      prediction.covariance,
+      [&](const Pose& T) {
+        const Vector3d turn = so3_log(found.q.conjugate() * T.q);
+        const Matrix3d J = so3_right_jacobian_inverse(turn);
+        constexpr double kPosition = 1.0 / (kFoundPosition_m * kFoundPosition_m);
+        constexpr double kRotation = 1.0 / (kFoundRotation_rad * kFoundRotation_rad);
+        PoseInformation pose;
+        pose.information.topLeftCorner<3, 3>() = kPosition * Matrix3d::Identity();
+        pose.information.bottomRightCorner<3, 3>() = kRotation * J.transpose() * J;
+        pose.gradient.head<3>() = kPosition * (T.p - found.p);
+        pose.gradient.tail<3>() = kRotation * J.transpose() * turn;
+        pose.count = static_cast<std::size_t>(config_.matching.min_matches);
+        return pose;
+      },
+      limits_of(config_.matching));
+  prediction.state = result.state;
+  prediction.covariance = result.covariance;
+  prediction.transition = (result.transition * prediction.transition).eval();
+  return result.used;
+}
+
+ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu, const PoseSearch& look) {
   begin(Stage::kPredict);
   Prediction prediction = predict(sweep, imu);
   add_drift(prediction);
@@ -188,6 +232,7 @@ ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu) {
   outcome.first = map_->empty();
 
   begin(Stage::kSolve);
+  const bool match_it = !outcome.first && (!look || search(look, outcome.thinned_base, prediction));
   ScanRecord record;
   record.stamp_ns = sweep.end_ns;
   record.before_rows = prediction.state;
@@ -195,7 +240,7 @@ ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu) {
   record.transition = prediction.transition;
   if (outcome.first) {
     outcome.used = outcome.points >= static_cast<std::size_t>(config_.matching.min_matches);
-  } else {
+  } else if (match_it) {
     const UpdateResult result = match(prediction, outcome.thinned_base, outcome);
     record.before_rows = result.state;
     record.covariance_before_rows = result.covariance;

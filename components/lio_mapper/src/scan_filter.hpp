@@ -14,7 +14,10 @@
 #include "workers.hpp"
 #include <Eigen/Core>
 
+#include <functional>
 #include <memory>
+#include <optional>
+#include <utility>
 
 namespace trigpoint::lio_mapper {
 
@@ -38,6 +41,25 @@ struct ScanOutcome {
   PointCloud thinned_base;  ///< undistorted, one a voxel
 };
 
+/// What a filter takes over from an earlier one of the same odom epoch.
+struct Past {
+  bool aligned{false};
+  double distance_m{0.0};
+  Eigen::Matrix4d drift_covariance{Eigen::Matrix4d::Zero()};
+  std::unique_ptr<LocalMap> map;
+};
+
+/// What a search for a scan's place found.
+struct Sighting {
+  bool match_as_usual{false};  ///< the prediction is good enough
+  std::optional<Pose> T_odom_base;
+};
+
+/// Finds a scan in the map whose predicted pose may be too uncertain for matching.
+using PoseSearch = std::function<Sighting(const State& predicted,
+                                          const ErrorMatrix& covariance,
+                                          const PointCloud& thinned_base)>;
+
 /// The method, one call a step: propagate, undistort, thin, match and update, apply GPS rows,
 /// insert. One odom epoch; knows nothing of start-up, waiting or reporting.
 class ScanFilter {
@@ -48,8 +70,11 @@ class ScanFilter {
              const InitialState& initial,
              StageObserver observe = {});
 
-  /// `imu` covers the sweep's end.
-  ScanOutcome process(const Sweep& sweep, const ImuBuffer& imu);
+  /// Before the first scan.
+  void take_over(Past past);
+
+  /// `imu` covers the sweep's end. With a `search` the scan is matched only where that finds it.
+  ScanOutcome process(const Sweep& sweep, const ImuBuffer& imu, const PoseSearch& search = {});
 
   Nanoseconds stamp_ns() const;
   const State& state() const;
@@ -60,6 +85,13 @@ class ScanFilter {
   double distance_m() const { return distance_m_; }
 
   const LocalMap& map() const { return *map_; }
+
+  /// Another one of the same place.
+  void replace_map(std::unique_ptr<LocalMap> map) { map_ = std::move(map); }
+
+  Workers& workers() { return *workers_; }
+
+  const Eigen::Matrix4d& drift_covariance() const { return drift_covariance_; }
 
   void align(const Alignment& alignment);
   RowVerdict apply(const StateUpdate& update);
@@ -93,6 +125,8 @@ class ScanFilter {
   Prediction predict(const Sweep& sweep, const ImuBuffer& imu) const;
   void add_drift(Prediction& prediction);
   void begin(Stage stage) const;
+  /// The prediction conditioned on the pose that a search found; false when it found none.
+  bool search(const PoseSearch& look, const PointCloud& thinned_base, Prediction& prediction) const;
   UpdateResult match(const Prediction& prediction,
                      const PointCloud& thinned_base,
                      ScanOutcome& outcome);
@@ -109,6 +143,8 @@ class ScanFilter {
   Eigen::Vector3d pruned_at_m_{Eigen::Vector3d::Zero()};
   Eigen::Matrix4d drift_covariance_{Eigen::Matrix4d::Zero()};  ///< of odom: yaw, x, y, z
 };
+
+PointCloud transformed(const PointCloud& points, const Pose& T);
 
 /// Covariance that a random walk of heading and position at `p_odom_m` adds to a transform
 /// (yaw, x, y, z) from odom into a frame turned by `R_frame_odom`: the heading turns about the

@@ -13,10 +13,10 @@ constexpr double kRewriteAfter_s = 3.0;
 
 }  // namespace
 
-GatePart::GatePart(const std::string& session)
+GatePart::GatePart(const std::string& session, exporter::Opening opening)
     : session_(session),
-      trajectory_(path_in(session, file::kFused), "base_link in map, as published online"),
-      gate_log_(path_in(session, file::kGate)),
+      trajectory_(path_in(session, file::kFused), "base_link in map, as published online", opening),
+      gate_log_(path_in(session, file::kGate), opening),
       counts_(session, "fusion_gate") {}
 
 void GatePart::on_fused(const Odometry& odometry) {

@@ -7,10 +7,10 @@ namespace trigpoint::pipeline {
 namespace file = exporter::session_file;
 using exporter::path_in;
 
-GpsPart::GpsPart(const std::string& session)
+GpsPart::GpsPart(const std::string& session, exporter::Opening opening)
     : session_(session),
-      trajectory_(path_in(session, file::kGps), "base_link in map, GPS odometry"),
-      statuses_(path_in(session, file::kGpsStatus)),
+      trajectory_(path_in(session, file::kGps), "base_link in map, GPS odometry", opening),
+      statuses_(path_in(session, file::kGpsStatus), opening),
       counts_(session, "gps_odometry") {}
 
 void GpsPart::on_odometry(const Odometry& odometry) {

@@ -109,6 +109,12 @@ Lockstep::Lockstep(const CoreConfigs& configs) : impl_(std::make_unique<Impl>(co
 
 Lockstep::~Lockstep() = default;
 
+void Lockstep::resume(const lio_mapper::Checkpoint& checkpoint,
+                      lio_mapper::StoredPoints points,
+                      const lio_mapper::ResumeOptions& options) {
+  impl_->mapper.resume(checkpoint, std::move(points), options);
+}
+
 Step Lockstep::step(const recording::LogEntry& entry) {
   Step step;
   if (!entry.withheld) {
@@ -137,6 +143,14 @@ GpsStatus Lockstep::gps_status() const {
 
 LioStatus Lockstep::lio_status() const {
   return impl_->mapper.status();
+}
+
+std::optional<lio_mapper::Checkpoint> Lockstep::checkpoint() const {
+  return impl_->mapper.checkpoint();
+}
+
+std::vector<lio_mapper::StoredRow> Lockstep::take_rows() {
+  return impl_->mapper.take_rows();
 }
 
 }  // namespace trigpoint::pipeline

@@ -9,8 +9,8 @@ namespace trigpoint::pipeline {
 namespace file = exporter::session_file;
 using exporter::path_in;
 
-LogPart::LogPart(const std::string& session)
-    : session_(session), fixes_(path_in(session, file::kFixes)), counts_(session, "log") {}
+LogPart::LogPart(const std::string& session, exporter::Opening opening)
+    : session_(session), fixes_(path_in(session, file::kFixes), opening), counts_(session, "log") {}
 
 void LogPart::on_entry(const recording::LogEntry& entry) {
   if (first_ns_ == 0) {

@@ -19,11 +19,22 @@ double milliseconds_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
+exporter::Opening opening_for(UseOfStored use) {
+  return use == UseOfStored::kResume ? exporter::Opening::kContinue : exporter::Opening::kFresh;
+}
+
 /// Everything that an offline run writes.
 class Session {
  public:
-  explicit Session(const std::string& folder)
-      : folder_(folder), gps_(folder), mapper_(folder), gate_(folder), log_(folder) {}
+  Session(const std::string& folder, UseOfStored use)
+      : folder_(folder),
+        gps_(folder, opening_for(use)),
+        mapper_(folder,
+                use == UseOfStored::kResume     ? Continuing::kYes
+                : use == UseOfStored::kLocalize ? Continuing::kNoStore
+                                                : Continuing::kNo),
+        gate_(folder, opening_for(use)),
+        log_(folder, opening_for(use)) {}
 
   void on_entry(const recording::LogEntry& entry) { log_.on_entry(entry); }
 
@@ -50,11 +61,11 @@ class Session {
     }
   }
 
-  void close(const Lockstep& cores, const recording::LogReader& log) {
+  void close(Lockstep& cores, const recording::LogReader& log) {
     keep_datum(cores);
     keep_alignment(cores);
     gps_.close(cores.gps_status());
-    mapper_.close(cores.lio_status());
+    mapper_.close(cores.lio_status(), cores.checkpoint(), cores.take_rows());
     gate_.close();
     log_.close(log);
   }
@@ -113,8 +124,16 @@ MapLogResult map_log(recording::LogReader& log,
                      const CoreConfigs& configs,
                      const MapLogOptions& options) {
   Lockstep cores(configs);
+  if (options.stored && options.use != UseOfStored::kNothing) {
+    lio_mapper::ResumeOptions resume;
+    resume.frozen_map = options.use == UseOfStored::kLocalize;
+    if (options.stored->first_pose) {
+      resume.more_places_odom.push_back(*options.stored->first_pose);
+    }
+    cores.resume(options.stored->checkpoint, options.stored->points, resume);
+  }
   exporter::create_session_folder(options.session);
-  Session session(options.session);
+  Session session(options.session, options.use);
   exporter::write_text(session.path(file::kConfig), options.config_text);
   session.keep_truth(log);
   const Clock::time_point start = Clock::now();

@@ -95,8 +95,8 @@ FixStatus status_of(double position_mode) {
 /// bad again in height.
 Eigen::Matrix3d covariance_of(double position_accuracy_m) {
   constexpr double kVerticalOverHorizontal = 1.5;
-  const Eigen::Vector3d sigma =
-      position_accuracy_m / std::numbers::sqrt2 * Eigen::Vector3d(1.0, 1.0, kVerticalOverHorizontal);
+  const Eigen::Vector3d sigma = position_accuracy_m / std::numbers::sqrt2 *
+                                Eigen::Vector3d(1.0, 1.0, kVerticalOverHorizontal);
   return sigma.cwiseAbs2().asDiagonal();
 }
 

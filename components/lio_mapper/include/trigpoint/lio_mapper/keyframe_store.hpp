@@ -2,24 +2,55 @@
 // Copyright the Trigpoint developers
 #pragma once
 
+#include "trigpoint/lio_mapper/checkpoint.hpp"
 #include "trigpoint/lio_mapper/lio_mapper.hpp"
 
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
+#include <vector>
 
 namespace trigpoint::lio_mapper {
 
-/// Append-only keyframes on disk (SQLite, one row each, format in KEYFRAMES.md): what was written
-/// survives the death of the writer.
+/// Append-only keyframes and GPS rows, and the newest checkpoint, on disk (SQLite, format in
+/// KEYFRAMES.md): what was written survives the death of the writer.
 class KeyframeWriter {
  public:
   /// Creates or continues `file`. Throws std::runtime_error naming the file and the cause.
   explicit KeyframeWriter(const std::string& file);
   ~KeyframeWriter();
-  /// Throws std::runtime_error when the disk is full or the file is gone.
+  /// The three below throw std::runtime_error when the disk is full or the file is gone.
   void append(const Keyframe& keyframe);
+  /// What one scan left, all of it or nothing: its keyframe if it made one, rows that were decided
+  /// since the last scan, and the checkpoint in place of the one before.
+  void commit(const Checkpoint& checkpoint,
+              const std::vector<StoredRow>& rows,
+              const std::optional<Keyframe>& keyframe);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// A store that is open for reading; may be while another writes. All throw std::runtime_error
+/// naming file and cause. Holds one keyframe at a time.
+class KeyframeReader {
+ public:
+  explicit KeyframeReader(const std::string& file);
+  ~KeyframeReader();
+
+  /// In order of time. Returns their number.
+  std::uint64_t visit(const std::function<void(const Keyframe&)>& visit);
+  /// Those of a region, in order of time; others are not read from the disk.
+  std::uint64_t visit(const MapRegion& region, const std::function<void(const Keyframe&)>& visit);
+  /// In the order in which they were decided. Returns their number.
+  std::uint64_t visit_rows(const std::function<void(const StoredRow&)>& visit);
+  /// The newest; nothing when the store has none, as one of format 3.
+  std::optional<Checkpoint> checkpoint();
+  /// Where the epoch's first keyframe was taken.
+  std::optional<Pose> first_pose(std::uint32_t odom_epoch);
 
  private:
   struct Impl;
@@ -30,5 +61,8 @@ class KeyframeWriter {
 /// cannot be read. Returns the number of keyframes.
 std::uint64_t read_keyframes(const std::string& file,
                              const std::function<void(const Keyframe&)>& visit);
+
+/// The points of a store as a mapper wants them that goes on from it. Opens the file at each call.
+StoredPoints stored_points_of(const std::string& file);
 
 }  // namespace trigpoint::lio_mapper

@@ -6,6 +6,7 @@
 #include "trigpoint/base/measurements.hpp"
 #include "trigpoint/base/messages.hpp"
 #include "trigpoint/base/robot.hpp"
+#include "trigpoint/lio_mapper/checkpoint.hpp"
 #include "trigpoint/lio_mapper/config.hpp"
 #include "trigpoint/lio_mapper/stages.hpp"
 
@@ -35,6 +36,17 @@ struct ScanResult {
   LioStatus status;
   PointCloud points_odom;  ///< registered points (undistorted, down-sampled as configured)
   std::optional<Keyframe> keyframe;
+  Checkpoint checkpoint;        ///< after this scan
+  std::vector<StoredRow> rows;  ///< decided since the scan before
+};
+
+/// How to go on from a checkpoint.
+struct ResumeOptions {
+  /// The stored map is used as it is: nothing enters it, no keyframe is made, and it is loaded
+  /// around the robot as that moves.
+  bool frozen_map{false};
+  /// Where the robot may be besides the checkpoint's own place, likeliest first.
+  std::vector<Pose> more_places_odom;
 };
 
 struct Output {
@@ -59,6 +71,17 @@ class LioMapper {
   Output on_state_update(const StateUpdate& update);
   /// Processes what waits for IMU samples that will not come (end of a log).
   Output finish();
+
+  /// Before the first input: odom, T_map_odom and counters of an earlier run go on. The ordinary
+  /// start runs in a frame of its own and is registered against the stored points near the
+  /// checkpoint (event `lio_resumed`); when that fails odom begins anew with the next epoch
+  /// (`lio_not_resumed`). `points` is called from inputs; what it throws goes through.
+  void resume(const Checkpoint& checkpoint, StoredPoints points, const ResumeOptions& options = {});
+
+  /// What a restart needs; nothing before the first scan.
+  std::optional<Checkpoint> checkpoint() const;
+  /// Decided since the newest scan: belong to the checkpoint above.
+  std::vector<StoredRow> take_rows();
 
   /// Tells what it is doing, from the next input on; for benchmarks.
   void observe_stages(StageObserver observer);

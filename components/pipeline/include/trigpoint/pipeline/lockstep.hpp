@@ -46,6 +46,11 @@ class Lockstep {
   explicit Lockstep(const CoreConfigs& configs);
   ~Lockstep();
 
+  /// Before the first entry: the mapper goes on from a stored session.
+  void resume(const lio_mapper::Checkpoint& checkpoint,
+              lio_mapper::StoredPoints points,
+              const lio_mapper::ResumeOptions& options);
+
   /// Withheld fixes are not fed to anybody.
   Step step(const recording::LogEntry& entry);
   /// End of the log: what still waits in the mapper.
@@ -55,6 +60,9 @@ class Lockstep {
   std::optional<Alignment> best_alignment() const;
   GpsStatus gps_status() const;
   LioStatus lio_status() const;
+  std::optional<lio_mapper::Checkpoint> checkpoint() const;
+  /// Rows that the mapper decided on since its newest scan.
+  std::vector<lio_mapper::StoredRow> take_rows();
 
  private:
   struct Impl;

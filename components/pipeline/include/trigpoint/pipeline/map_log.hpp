@@ -3,12 +3,21 @@
 #pragma once
 
 #include "trigpoint/pipeline/lockstep.hpp"
+#include "trigpoint/pipeline/session_parts.hpp"
 #include "trigpoint/recording/log.hpp"
 
 #include <functional>
+#include <optional>
 #include <string>
 
 namespace trigpoint::pipeline {
+
+/// What becomes of a stored session.
+enum class UseOfStored {
+  kNothing,
+  kLocalize,  ///< its map is used as it is; `session` is another folder
+  kResume     ///< it is continued: odom, map and datum go on; `session` is its folder
+};
 
 struct MapLogOptions {
   std::string session;      ///< folder, created when missing
@@ -19,6 +28,8 @@ struct MapLogOptions {
   std::function<void(const Event&)> on_event;  ///< may be empty
   /// Asked between entries; true ends the run early, with what was done so far kept.
   std::function<bool()> stop;
+  UseOfStored use{UseOfStored::kNothing};
+  std::optional<StoredSession> stored;  ///< what `use` is about
 };
 
 struct MapLogResult {

@@ -21,7 +21,8 @@ namespace trigpoint::pipeline {
 /// gps.tum, gps_status.csv, datum.yaml and the filter's counts.
 class GpsPart {
  public:
-  explicit GpsPart(const std::string& session);
+  explicit GpsPart(const std::string& session,
+                   exporter::Opening opening = exporter::Opening::kFresh);
   void on_odometry(const Odometry& odometry);
   void on_status(const GpsStatus& status);
   void on_datum(const Datum& datum);
@@ -34,24 +35,50 @@ class GpsPart {
   exporter::CountsWriter counts_;
 };
 
+/// The checkpoint that a mapper left in a session folder, if any.
+std::optional<lio_mapper::Checkpoint> stored_checkpoint(const std::string& session);
+
+/// What one needs of a session to go on from it.
+struct StoredSession {
+  lio_mapper::Checkpoint checkpoint;
+  lio_mapper::StoredPoints points;
+  std::optional<Pose> first_pose;  ///< of the checkpoint's odom epoch
+  std::optional<Datum> datum;
+};
+
+/// Throws ConfigError that says what the folder lacks, and what KeyframeReader throws.
+StoredSession open_stored_session(const std::string& session);
+
+/// What a mapper's part does with what is there.
+enum class Continuing {
+  kNo,      ///< begins
+  kYes,     ///< the files go on
+  kNoStore  ///< begins, without a keyframe store unless a keyframe is made
+};
+
 /// lio.tum, scans.csv, keyframes.sqlite and the mapper's counts.
 class MapperPart {
  public:
-  explicit MapperPart(const std::string& session);
+  explicit MapperPart(const std::string& session, Continuing continuing = Continuing::kNo);
   void on_scan(const lio_mapper::ScanResult& scan);
-  void close(const LioStatus& status);
+  /// With what the mapper knows after its last scan.
+  void close(const LioStatus& status,
+             const std::optional<lio_mapper::Checkpoint>& checkpoint,
+             const std::vector<lio_mapper::StoredRow>& rows);
 
  private:
   exporter::TrajectoryWriter trajectory_;
   exporter::ScanLog scans_;
-  lio_mapper::KeyframeWriter keyframes_;
+  std::string store_;
+  std::optional<lio_mapper::KeyframeWriter> keyframes_;
   exporter::CountsWriter counts_;
 };
 
 /// fused.tum, gate.csv, alignment.yaml and the gate's counts.
 class GatePart {
  public:
-  explicit GatePart(const std::string& session);
+  explicit GatePart(const std::string& session,
+                    exporter::Opening opening = exporter::Opening::kFresh);
   void on_fused(const Odometry& odometry);
   void on_status(const FusionStatus& status);
   /// The best alignment so far. Written when it tells something new, and then at most every few
@@ -76,7 +103,8 @@ class GatePart {
 /// fixes.csv and the counts of what the log held and of what was handed on.
 class LogPart {
  public:
-  explicit LogPart(const std::string& session);
+  explicit LogPart(const std::string& session,
+                   exporter::Opening opening = exporter::Opening::kFresh);
   void on_entry(const recording::LogEntry& entry);
   /// `log` is what the entries came from; it knows what it passed over.
   void close(const recording::LogReader& log);

@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "resumption.hpp"
+
+#include "trigpoint/base/so3.hpp"
+
+#include "downsample.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <utility>
+
+namespace trigpoint::lio_mapper {
+
+using Eigen::Matrix3d;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+namespace {
+
+constexpr std::size_t kSweepsBetweenAttempts = 5;
+constexpr std::size_t kMostSweeps = 20;  // that are put together for a registration
+/// A robot that was restarted while it drove has gone on at most this long at its speed.
+constexpr double kLongestDrive_s = 5.0;
+/// Of a registered pose, before the first scan is matched.
+constexpr double kPositionSigma_m = 0.1;
+constexpr double kRotationSigma_rad = 0.01;
+
+Quaterniond without_yaw(const Quaterniond& q) {
+  return (from_yaw(-yaw_of(q)) * q).normalized();
+}
+
+/// The waiting sweeps in one cloud, axes of base at the newest one.
+struct Gathered {
+  PointCloud points_base;
+  Pose T_new_base;
+};
+
+Gathered gather(const Config& config,
+                const InitialState& initial,
+                const Pose& T_base_lidar,
+                const ImuBuffer& imu,
+                const std::deque<Sweep>& sweeps) {
+  ScanFilter filter(config, T_base_lidar, initial);
+  PointCloud all_new;
+  for (std::size_t i = 0; i < std::min(sweeps.size(), kMostSweeps); ++i) {
+    if (sweeps[i].end_ns > imu.newest_ns()) {
+      break;
+    }
+    const ScanOutcome outcome = filter.process(sweeps[i], imu);
+    filter.insert(outcome);
+    const PointCloud moved = transformed(outcome.thinned_base, filter.state().T_odom_base);
+    all_new.insert(all_new.end(), moved.begin(), moved.end());
+  }
+  const Pose T_new_base = filter.state().T_odom_base;
+  return {downsample(transformed(all_new, T_new_base.inverse()), config.matching.voxel_m),
+          T_new_base};
+}
+
+/// The checkpoint's covariance where it says something of today, as far as it has our size.
+ErrorMatrix covariance_from(const Checkpoint& checkpoint, const ErrorMatrix& otherwise) {
+  ErrorMatrix P = otherwise;
+  const Eigen::Index size = std::min<Eigen::Index>(error::kSize, checkpoint.covariance.rows());
+  P.topRows(size).setZero();
+  P.leftCols(size).setZero();
+  P.topLeftCorner(size, size) = checkpoint.covariance.topLeftCorner(size, size);
+  return P;
+}
+
+/// Pose and velocity are new and not tied to anything that was known before.
+void set_pose_and_velocity(const ErrorMatrix& start, const Matrix3d& R_old_new, ErrorMatrix& P) {
+  constexpr int kNew = error::kVelocity + 3;
+  P.topRows<kNew>().setZero();
+  P.leftCols<kNew>().setZero();
+  P.block<3, 3>(error::kPosition, error::kPosition) =
+      kPositionSigma_m * kPositionSigma_m * Matrix3d::Identity();
+  P.block<3, 3>(error::kRotation, error::kRotation) =
+      kRotationSigma_rad * kRotationSigma_rad * Matrix3d::Identity();
+  P.block<3, 3>(error::kVelocity, error::kVelocity) =
+      R_old_new * start.block<3, 3>(error::kVelocity, error::kVelocity) * R_old_new.transpose();
+}
+
+/// Biases walk on while nobody looks, up to what they may be at any start.
+void let_biases_walk(const ImuConfig& imu, double away_s, ErrorMatrix& P) {
+  const auto walk = [&](int at, double density, double initial_sigma) {
+    for (int i = at; i < at + 3; ++i) {
+      const double limit = std::max(P(i, i), initial_sigma * initial_sigma);
+      P(i, i) = std::min(limit, P(i, i) + density * density * away_s);
+    }
+  };
+  walk(error::kGyroBias, imu.gyro_bias_walk_radps_sqrts, imu.initial_gyro_bias_sigma_radps);
+  walk(error::kAccelBias, imu.accel_bias_walk_mps2_sqrts, imu.initial_accel_bias_sigma_mps2);
+}
+
+}  // namespace
+
+std::string offset_text(const Pose& T_from, const Pose& T_to) {
+  constexpr double kDegrees = 57.29577951308232;
+  const Vector3d offset = T_to.p - T_from.p;
+  char text[160];
+  std::snprintf(text,
+                sizeof text,
+                "%.2f m aside, %+.2f m in height and %+.1f degrees from the predicted place",
+                offset.head<2>().norm(),
+                offset.z(),
+                kDegrees * wrap_angle(yaw_of(T_to.q) - yaw_of(T_from.q)));
+  return text;
+}
+
+std::unique_ptr<LocalMap> load_map(const LocalMapConfig& config,
+                                   const StoredPoints& points,
+                                   std::uint32_t odom_epoch,
+                                   const Vector3d& center_odom_m,
+                                   bool recent_stretch) {
+  auto map = make_local_map(config);
+  points({odom_epoch, center_odom_m, config.half_side_m, recent_stretch},
+         [&](const PointCloud& cloud) { map->insert(cloud); });
+  map->prune(center_odom_m, config.half_side_m);
+  return map;
+}
+
+Resumption::Resumption(const Config& config,
+                       const Checkpoint& checkpoint,
+                       StoredPoints points,
+                       const ResumeOptions& options)
+    : config_(config), checkpoint_(checkpoint), points_(std::move(points)), options_(options) {}
+
+std::vector<SearchArea> Resumption::areas(Nanoseconds now_ns) const {
+  const double radius_m = config_.recovery.radius_m;
+  const double yaw_rad = config_.recovery.yaw_rad;
+  std::vector<SearchArea> result;
+  for (const Pose& place : options_.more_places_odom) {
+    result.push_back({{place}, radius_m, yaw_rad});
+  }
+  SearchArea at_checkpoint{{checkpoint_.T_odom_base}, radius_m, yaw_rad};
+  const double away_s = to_seconds(now_ns - checkpoint_.stamp_ns);
+  const Vector3d driven_m = std::max(0.0, away_s) * checkpoint_.v_odom_mps;
+  if (away_s < kLongestDrive_s && driven_m.norm() > 1.0) {
+    at_checkpoint.centres_odom.emplace_back(checkpoint_.T_odom_base.q,
+                                            checkpoint_.T_odom_base.p + driven_m);
+  }
+  result.push_back(std::move(at_checkpoint));
+  return result;
+}
+
+Resumption::Found Resumption::compose(const StartResult& start,
+                                      const Pose& T_old_new,
+                                      const Registration& registration,
+                                      std::unique_ptr<LocalMap> map) const {
+  Found found;
+  found.initial = start.initial;
+  State& state = found.initial.state;
+  state.T_odom_base = T_old_new * state.T_odom_base;
+  state.v_odom_mps = T_old_new.q * state.v_odom_mps;
+  state.gravity_odom_mps2 = checkpoint_.gravity_odom_mps2;
+  state.accel_bias_mps2 = checkpoint_.accel_bias_mps2;
+  state.T_map_odom = checkpoint_.T_map_odom;
+  state.T_map_odom.tilt_rad.setZero();
+  if (!start.at_rest) {
+    state.gyro_bias_radps = checkpoint_.gyro_bias_radps;
+  }
+  ErrorMatrix& P = found.initial.covariance;
+  const ErrorMatrix at_start = P;
+  P = covariance_from(checkpoint_, at_start);
+  set_pose_and_velocity(at_start, T_old_new.q.toRotationMatrix(), P);
+  const double away_s = to_seconds(found.initial.stamp_ns - checkpoint_.stamp_ns);
+  let_biases_walk(config_.imu, std::max(0.0, away_s), P);
+  const double moved_m = (state.T_odom_base.p - checkpoint_.T_odom_base.p).norm();
+  if (!options_.frozen_map) {
+    add_drift_noise(config_.drift, moved_m, state, checkpoint_.aligned, P);
+  }
+  make_symmetric(P);
+  found.past.aligned = checkpoint_.aligned;
+  found.past.distance_m = checkpoint_.distance_m + (options_.frozen_map ? 0.0 : moved_m);
+  found.past.drift_covariance = checkpoint_.drift_covariance;
+  found.past.map = std::move(map);
+  char fit[120];
+  std::snprintf(fit,
+                sizeof fit,
+                "; %.0f %% of what stands out lies on the map, %.0f %% at the next best place",
+                100.0 * registration.share,
+                100.0 * registration.runner_up_share);
+  found.text = offset_text(registration.nearest_centre, registration.T_odom_base) + fit;
+  return found;
+}
+
+std::optional<Resumption::Found> Resumption::attempt(const StartResult& start,
+                                                     const Pose& T_base_lidar,
+                                                     const ImuBuffer& imu,
+                                                     const std::deque<Sweep>& sweeps) {
+  ++attempts_;
+  next_at_ = sweeps.size() + kSweepsBetweenAttempts;
+  const Gathered gathered = gather(config_, start.initial, T_base_lidar, imu, sweeps);
+  const LevelScan scan{gathered.points_base, without_yaw(gathered.T_new_base.q), T_base_lidar.p};
+  Workers workers(static_cast<std::size_t>(config_.matching.threads));
+  obstacle_.clear();
+  for (const SearchArea& area : areas(sweeps.front().end_ns)) {
+    auto map = load_map(config_.local_map,
+                        points_,
+                        checkpoint_.odom_epoch,
+                        area.centres_odom.front().p,
+                        !options_.frozen_map);
+    const RegistrationResult result =
+        register_scan(scan, *map, area, config_.matching, config_.recovery, workers);
+    if (result.accepted) {
+      const Pose T_old_new = result.best->T_odom_base * gathered.T_new_base.inverse();
+      return compose(start, T_old_new, *result.best, std::move(map));
+    }
+    obstacle_ += (obstacle_.empty() ? "" : "; elsewhere: ") + result.obstacle;
+  }
+  return std::nullopt;
+}
+
+}  // namespace trigpoint::lio_mapper
