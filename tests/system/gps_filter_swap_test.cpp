@@ -109,9 +109,12 @@ TEST(Contract, is_kept_by_the_test_filter_when_it_does_not_lie) {
 TEST(Contract, is_not_checked_beside_real_sensors_and_says_whose_they_are) {
   const Command filter({program("trigpoint_gps_ekf15")}, on_domain());
   const Command player(
-      {program("trigpoint"), "play", "circle", "--duration", "20", "--rate", "1", "--wait", "0"},
+      {program("trigpoint"), "play", "circle", "--duration", "60", "--rate", "1", "--wait", "0"},
       on_domain());
-  std::this_thread::sleep_for(1s);
+  CommandResult survey;
+  for (int i = 0; i < 10 && survey.output.find("imu/data") == std::string::npos; ++i) {
+    survey = run_command({program("trigpoint"), "doctor", "--seconds", "2"}, 30s, on_domain());
+  }
   const CommandResult result =
       run_command({program("trigpoint"), "doctor", "--gps-filter"}, 60s, on_domain());
   EXPECT_EQ(result.exit_code, 1);
