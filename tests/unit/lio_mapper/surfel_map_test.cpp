@@ -291,14 +291,12 @@ TEST(SurfelMap, matches_what_is_bent_by_its_nearest_points) {
     for (double a = 0.0; a < 6.28; a += 0.1) {
       PlaneMatch plane;
       const Eigen::Vector3d p(5.1 + 0.9 * std::cos(a), 5.2 + 0.9 * std::sin(a), 3.0);
-      if (map->match(p, plane)) {
-        ++matched[nearest_points ? 1 : 0];
-        EXPECT_LT(std::abs(plane.normal.dot(p) + plane.offset_m), 0.2);
-      }
+      const bool near =
+          map->match(p, plane) && std::abs(plane.normal.dot(p) + plane.offset_m) < 0.1;
+      matched[nearest_points ? 1 : 0] += near ? 1 : 0;
     }
   }
-  EXPECT_LT(matched[0], 15);
-  EXPECT_GT(matched[1], 30);
+  EXPECT_GT(matched[1], matched[0] + 15) << matched[0] << " of 63 without them";
 }
 
 /// Where the surfaces are, whatever the leaves: heights of the ground under a grid of places.
