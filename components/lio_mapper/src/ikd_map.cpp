@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 namespace trigpoint::lio_mapper {
 
@@ -15,10 +14,6 @@ using Eigen::Vector3d;
 namespace {
 
 constexpr std::size_t kPlanePoints = 5;
-/// (5 mm)^2, as in the surfel map: no LiDAR knows a surface better.
-constexpr double kThicknessFloor2_m2 = 2.5e-5;
-/// A line through the points lets the plane turn about it (middle over largest spread).
-constexpr double kLeastLinearity = 0.01;
 
 }  // namespace
 
@@ -33,28 +28,17 @@ bool IkdMap::match(const Vector3d& point_odom_m, PlaneMatch& plane) const {
   }
   // About the nearest one, so that nothing is lost far from the origin.
   const Vector3d origin = found[0].position_m.cast<double>();
-  Moments moments;
-  for (const IkdTree::Neighbour& neighbour : found) {
-    moments.add(neighbour.position_m.cast<double>() - origin);
-  }
-  const auto fit = fit_plane(moments);
-  if (!fit || fit->linearity() < kLeastLinearity) {
-    return false;
-  }
-  const Vector3d centroid_m = fit->centroid + origin;
-  const bool flat =
-      std::all_of(found.begin(), found.end(), [&](const IkdTree::Neighbour& neighbour) {
-        const Vector3d from_centroid_m = neighbour.position_m.cast<double>() - centroid_m;
-        return std::abs(fit->normal.dot(from_centroid_m)) < config_.max_plane_distance_m;
-      });
-  if (!flat) {
+  std::array<Vector3d, kPlanePoints> points;
+  std::transform(found.begin(), found.end(), points.begin(), [&](const auto& neighbour) {
+    return Vector3d(neighbour.position_m.template cast<double>() - origin);
+  });
+  const auto fit = fit_neighbours(points, config_.max_plane_distance_m);
+  if (!fit) {
     return false;
   }
   plane.normal = fit->normal;
-  plane.offset_m = -fit->normal.dot(centroid_m);
-  // Three of the five degrees of freedom went into the plane.
-  constexpr double kUnbiased = static_cast<double>(kPlanePoints) / (kPlanePoints - 3.0);
-  plane.thickness2_m2 = kUnbiased * fit->eigenvalues[0] + kThicknessFloor2_m2;
+  plane.offset_m = -fit->normal.dot(fit->centroid + origin);
+  plane.thickness2_m2 = thickness2_of_neighbours_m2(*fit, kPlanePoints);
   return true;
 }
 

@@ -4,7 +4,17 @@
 
 #include <Eigen/Eigenvalues>
 
+#include <algorithm>
+#include <cmath>
+
 namespace trigpoint::lio_mapper {
+
+namespace {
+
+/// A line through the points lets the plane turn about it (middle over largest spread).
+constexpr double kLeastNeighbourLinearity = 0.01;
+
+}  // namespace
 
 std::optional<PlaneFit> fit_plane(const Moments& moments) {
   if (moments.count < 3) {
@@ -27,6 +37,27 @@ std::optional<PlaneFit> fit_plane(const Moments& moments) {
     fit.normal = -fit.normal;
   }
   return fit;
+}
+
+std::optional<PlaneFit> fit_neighbours(std::span<const Eigen::Vector3d> points,
+                                       double max_distance_m) {
+  Moments moments;
+  for (const Eigen::Vector3d& point : points) {
+    moments.add(point);
+  }
+  auto fit = fit_plane(moments);
+  if (!fit || fit->linearity() < kLeastNeighbourLinearity) {
+    return std::nullopt;
+  }
+  const bool flat = std::all_of(points.begin(), points.end(), [&](const Eigen::Vector3d& point) {
+    return std::abs(fit->normal.dot(point - fit->centroid)) <= max_distance_m;
+  });
+  return flat ? fit : std::nullopt;
+}
+
+double thickness2_of_neighbours_m2(const PlaneFit& plane, std::size_t count) {
+  const auto n = static_cast<double>(count);
+  return n / (n - 3.0) * plane.eigenvalues[0] + kThicknessFloor2_m2;
 }
 
 }  // namespace trigpoint::lio_mapper

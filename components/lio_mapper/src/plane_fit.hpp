@@ -4,7 +4,9 @@
 
 #include <Eigen/Core>
 
+#include <cstddef>
 #include <optional>
+#include <span>
 
 namespace trigpoint::lio_mapper {
 
@@ -56,5 +58,16 @@ struct PlaneFit {
 /// normal is the axis of least spread, its sign such that the largest component is positive.
 /// Nothing for fewer than 3 points or points that all coincide.
 std::optional<PlaneFit> fit_plane(const Moments& moments);
+
+/// (5 mm)^2: no LiDAR knows a surface better, however well its points agree.
+inline constexpr double kThicknessFloor2_m2 = 2.5e-5;
+
+/// FAST-LIO2's plane of few neighbouring points [W. Xu et al., FAST-LIO2, T-RO 2022, section V]:
+/// nothing when they lie on a line or one of them is farther than `max_distance_m` from it.
+std::optional<PlaneFit> fit_neighbours(std::span<const Eigen::Vector3d> points,
+                                       double max_distance_m);
+
+/// Variance across the plane of `count` points: three of their degrees of freedom went into it.
+double thickness2_of_neighbours_m2(const PlaneFit& plane, std::size_t count);
 
 }  // namespace trigpoint::lio_mapper

@@ -37,14 +37,10 @@ constexpr double kSurfaceShare = 0.95;
 /// the distance along it: else a point beside a corner may be given to the wall it does not lie on.
 constexpr double kAcrossWeight2 = 9.0;
 
-/// Where no plane holds: this many points, the farthest within so many sides of a leaf, none
-/// farther from their plane, and no line.
+/// Where no plane holds: the farthest of the nearest points within so many sides of a leaf, and
+/// none farther from their plane.
 constexpr double kNearestReach = 3.0;  // as far as the neighbouring parents surely hold them all
 constexpr double kNearestPlane_m = 0.1;
-constexpr double kLeastNearLinearity = 0.01;
-
-/// (5 mm)^2: no LiDAR knows a surface better, however well the means agree.
-constexpr double kThicknessFloor2_m2 = 2.5e-5;
 
 /// For each of the 27 directions: the leaves of that neighbour which touch the parent in the
 /// middle.
@@ -151,25 +147,17 @@ bool SurfelMap::match_nearest_points(const Eigen::Vector3d& point_odom_m, PlaneM
   if (!(nearest.back().distance2_m2 < farthest_m * farthest_m)) {
     return false;
   }
-  Moments moments;
-  for (const NearPoint& near : nearest) {
-    moments.add(near.offset_m);
-  }
-  const auto fit = fit_plane(moments);
-  if (!fit || fit->linearity() < kLeastNearLinearity ||
-      std::abs(fit->normal.dot(fit->centroid)) > config_.max_residual_m) {
+  std::array<Eigen::Vector3d, kNearestPoints> points;
+  std::transform(nearest.begin(), nearest.end(), points.begin(), [](const NearPoint& near) {
+    return near.offset_m;
+  });
+  const auto fit = fit_neighbours(points, kNearestPlane_m);
+  if (!fit || std::abs(fit->normal.dot(fit->centroid)) > config_.max_residual_m) {
     return false;
-  }
-  for (const NearPoint& near : nearest) {
-    if (std::abs(fit->normal.dot(near.offset_m - fit->centroid)) > kNearestPlane_m) {
-      return false;
-    }
   }
   plane.normal = fit->normal;
   plane.offset_m = -fit->normal.dot(fit->centroid + point_odom_m);
-  // Three degrees of freedom of the five went into the plane.
-  plane.thickness2_m2 =
-      fit->eigenvalues[0] * kNearestPoints / (kNearestPoints - 3) + kThicknessFloor2_m2;
+  plane.thickness2_m2 = thickness2_of_neighbours_m2(*fit, points.size());
   return true;
 }
 
