@@ -158,7 +158,7 @@ void check_truth(SessionData& data) {
     return;
   }
   const double moved_m = (geodesy::LocalFrame(*data.datum)
-                              .to_map({named->latitude_deg, named->longitude_deg, named->height_m})
+                              .to_map(geodesy::place_of(*named))
                               .value_or(Eigen::Vector3d::Constant(kNaN)))
                              .norm();
   if (moved_m <= kSameDatum_m) {

@@ -24,11 +24,11 @@ std::string sentence(const char* format, double value) {
   return text.data();
 }
 
+}  // namespace
+
 Geographic place_of(const Datum& datum) {
   return {datum.latitude_deg, datum.longitude_deg, datum.height_m};
 }
-
-}  // namespace
 
 std::optional<std::string> find_fault(const Geographic& place) {
   if (!std::isfinite(place.latitude_deg)) {

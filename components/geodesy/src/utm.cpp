@@ -20,7 +20,7 @@ constexpr double kSouthFalseNorthing_m = 10'000'000.0;
 }  // namespace
 
 UtmZone utm_zone_of(const Datum& datum) {
-  const Geographic place{datum.latitude_deg, datum.longitude_deg, datum.height_m};
+  const Geographic place = place_of(datum);
   if (const auto fault = find_fault(place)) {
     throw std::invalid_argument("The datum has no UTM zone: " + *fault + ".");
   }

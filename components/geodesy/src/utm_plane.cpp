@@ -39,7 +39,7 @@ Vector2d grid_of(const UtmPosition& utm) {
 }  // namespace
 
 UtmPlane::UtmPlane(const Datum& datum) : zone_(utm_zone_of(datum)) {
-  const auto origin = to_utm({datum.latitude_deg, datum.longitude_deg, datum.height_m}, zone_);
+  const auto origin = to_utm(place_of(datum), zone_);
   if (!origin) {
     throw std::invalid_argument("The datum at latitude " + std::to_string(datum.latitude_deg) +
                                 " degrees has no UTM coordinates, expected -84 to 84.");

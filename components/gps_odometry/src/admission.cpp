@@ -6,12 +6,8 @@ namespace trigpoint::gps_odometry {
 
 namespace {
 
-geodesy::Geographic place_of(const Datum& datum) {
-  return {datum.latitude_deg, datum.longitude_deg, datum.height_m};
-}
-
 bool has_utm(const Datum& datum) {
-  return geodesy::to_utm(place_of(datum), geodesy::utm_zone_of(datum)).has_value();
+  return geodesy::to_utm(geodesy::place_of(datum), geodesy::utm_zone_of(datum)).has_value();
 }
 
 }  // namespace
@@ -154,7 +150,7 @@ std::optional<Event> projection_event(const geodesy::LocalFrame& frame,
     return std::nullopt;
   }
   const geodesy::UtmZone zone = geodesy::utm_zone_of(frame.datum());
-  const auto utm = geodesy::to_utm(place_of(frame.datum()), zone);
+  const auto utm = geodesy::to_utm(geodesy::place_of(frame.datum()), zone);
   if (!utm) {
     return Event{Severity::kWarning,
                  now_ns,

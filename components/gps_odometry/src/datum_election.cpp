@@ -33,8 +33,7 @@ std::optional<Datum> configured_datum(const Config& config) {
   }
   const Datum datum{
       config.datum_latitude_deg, config.datum_longitude_deg, config.datum_height_m, 0};
-  if (const auto fault =
-          geodesy::find_fault({datum.latitude_deg, datum.longitude_deg, datum.height_m})) {
+  if (const auto fault = geodesy::find_fault(geodesy::place_of(datum))) {
     throw ConfigError("gps_odometry: the datum is not a place: " + *fault + ".");
   }
   return datum;

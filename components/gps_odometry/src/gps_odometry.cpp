@@ -25,10 +25,6 @@ namespace {
 constexpr Nanoseconds kStatusInterval_ns = kNanosecondsPerSecond;
 constexpr double kFrozenSpeed_mps = 0.5;
 
-geodesy::Geographic place_of(const Datum& datum) {
-  return {datum.latitude_deg, datum.longitude_deg, datum.height_m};
-}
-
 }  // namespace
 
 struct GpsOdometry::Impl {
@@ -277,7 +273,7 @@ void GpsOdometry::Impl::elect(const CheckedFix& fix, Output& output) {
 void GpsOdometry::Impl::move_to(const Datum& new_datum, Output& output) {
   geodesy::LocalFrame new_frame = make_frame(new_datum, config);
   if (frame) {
-    const geodesy::Geographic old_origin = place_of(frame->datum());
+    const geodesy::Geographic old_origin = geodesy::place_of(frame->datum());
     const Eigen::Matrix3d R = new_frame.R_map_enu(old_origin);
     // Where a grid has ended the tangent plane goes on: the same map.
     const Eigen::Vector3d t =
@@ -451,7 +447,7 @@ Output GpsOdometry::on_yaw(const YawMeasurement& yaw) {
 Output GpsOdometry::on_datum(const Datum& candidate) {
   Output output;
   Impl& impl = *impl_;
-  if (const auto fault = geodesy::find_fault(place_of(candidate))) {
+  if (const auto fault = geodesy::find_fault(geodesy::place_of(candidate))) {
     impl.refuse("datum_not_a_place", "Datum refused: " + *fault + ".", impl.now_ns, output);
     return output;
   }

@@ -124,7 +124,7 @@ class Passthrough {
   /// The older election wins; whoever knows the datum publishes it.
   void adopt(const Datum& datum) {
     const bool older = !frame_ || datum.elected_ns < frame_->datum().elected_ns;
-    if (older && !geodesy::find_fault({datum.latitude_deg, datum.longitude_deg, datum.height_m})) {
+    if (older && !geodesy::find_fault(geodesy::place_of(datum))) {
       frame_.emplace(datum);
       said_.datum_id = datum.id();
       datum_.publish(bus::to_message(datum));

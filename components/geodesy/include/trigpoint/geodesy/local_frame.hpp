@@ -21,6 +21,9 @@ struct Geographic {
   double height_m{kNaN};  ///< above the WGS 84 ellipsoid
 };
 
+/// Where `map` has its origin.
+Geographic place_of(const Datum& datum);
+
 /// Why a place cannot be used, as a sentence with the value and what was expected; nullopt when it
 /// can. Ranges: research/gps E (|lat| <= 90, |lon| <= 180, |h| < 20 km, finite, not exactly 0, 0).
 std::optional<std::string> find_fault(const Geographic& place);
