@@ -4,7 +4,7 @@
 // index, which is at the end of the file, is missing.
 //
 // [1] http://wiki.ros.org/Bags/Format/2.0
-#include "ros1_messages.hpp"
+#include "ros1_source.hpp"
 #include "rosbag1_source.hpp"
 #include <bzlib.h>
 #include <roslz4/lz4s.h>
@@ -129,7 +129,7 @@ struct Place {
   std::size_t size;
 };
 
-class SalvagedBag : public BagSource {
+class SalvagedBag : public Ros1Source {
  public:
   explicit SalvagedBag(const fs::path& file) : stream_(file, std::ios::binary) {
     summary_.path = file.string();
@@ -183,30 +183,6 @@ class SalvagedBag : public BagSource {
       raw.bytes.assign(begin, begin + static_cast<std::ptrdiff_t>(place.size));
     }
     return raw;
-  }
-
-  bool decode(const RawMessage& raw, ImuSample& imu) const override {
-    return decode_ros1(raw.bytes, imu);
-  }
-
-  bool decode(const RawMessage& raw, GnssFix& fix) const override {
-    return decode_ros1(raw.bytes, fix);
-  }
-
-  bool decode(const RawMessage& raw, PointCloudMessage& cloud) const override {
-    return decode_ros1(raw.bytes, cloud);
-  }
-
-  bool decode(const RawMessage& raw, TwistMeasurement& twist) const override {
-    return decode_ros1(raw.bytes, twist);
-  }
-
-  bool decode(const RawMessage& raw, Odometry& odometry) const override {
-    return decode_ros1(raw.bytes, odometry);
-  }
-
-  bool decode(const RawMessage& raw, YawMeasurement& yaw) const override {
-    return decode_ros1(raw.bytes, yaw);
   }
 
  private:

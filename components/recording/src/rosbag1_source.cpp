@@ -2,7 +2,7 @@
 // Copyright the Trigpoint developers
 #include "rosbag1_source.hpp"
 
-#include "ros1_messages.hpp"
+#include "ros1_source.hpp"
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
 
@@ -21,7 +21,7 @@ Nanoseconds nanoseconds_of(const ros::Time& time) {
   return static_cast<Nanoseconds>(time.sec) * kNanosecondsPerSecond + time.nsec;
 }
 
-class IndexedBag : public BagSource {
+class IndexedBag : public Ros1Source {
  public:
   explicit IndexedBag(const fs::path& file) {
     bag_.open(file.string(), rosbag::bagmode::Read);
@@ -56,30 +56,6 @@ class IndexedBag : public BagSource {
       at_ = view_->end();
       throw LogError(summary_.path + ": the bag is damaged: " + error.what());
     }
-  }
-
-  bool decode(const RawMessage& raw, ImuSample& imu) const override {
-    return decode_ros1(raw.bytes, imu);
-  }
-
-  bool decode(const RawMessage& raw, GnssFix& fix) const override {
-    return decode_ros1(raw.bytes, fix);
-  }
-
-  bool decode(const RawMessage& raw, PointCloudMessage& cloud) const override {
-    return decode_ros1(raw.bytes, cloud);
-  }
-
-  bool decode(const RawMessage& raw, TwistMeasurement& twist) const override {
-    return decode_ros1(raw.bytes, twist);
-  }
-
-  bool decode(const RawMessage& raw, Odometry& odometry) const override {
-    return decode_ros1(raw.bytes, odometry);
-  }
-
-  bool decode(const RawMessage& raw, YawMeasurement& yaw) const override {
-    return decode_ros1(raw.bytes, yaw);
   }
 
  private:
