@@ -111,6 +111,20 @@ void describe_matching(MatchingConfig& c, ConfigFields& f) {
            kPositive);
 }
 
+void describe_extrinsic(ExtrinsicConfig& c, ConfigFields& f) {
+  f.flag("estimate",
+         c.estimate,
+         "whether robot.lidar_* are where the estimate starts (true) or taken as exact (false)");
+  f.number("rotation_sigma_rad",
+           c.rotation_sigma_rad,
+           "how well the configured rotation is known, each axis",
+           kNotNegative);
+  f.number("position_sigma_m",
+           c.position_sigma_m,
+           "how well the configured position is known, each axis",
+           kNotNegative);
+}
+
 void describe_surfel_map(SurfelMapConfig& c, ConfigFields& f) {
   auto capacity = static_cast<std::int64_t>(c.leaf_capacity);
   f.number("leaf_m",
@@ -186,6 +200,9 @@ void describe(Config& config, ConfigFields& fields) {
   });
   fields.section("matching", "scan against local map", [&](ConfigFields& f) {
     describe_matching(config.matching, f);
+  });
+  fields.section("extrinsic", "where the LiDAR sits on base_link", [&](ConfigFields& f) {
+    describe_extrinsic(config.extrinsic, f);
   });
   fields.section("local_map", "what scans are matched against", [&](ConfigFields& f) {
     describe_local_map(config.local_map, f);

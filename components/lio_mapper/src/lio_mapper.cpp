@@ -5,6 +5,7 @@
 #include "trigpoint/base/config.hpp"
 #include "trigpoint/base/so3.hpp"
 
+#include "calibration_report.hpp"
 #include "downsample.hpp"
 #include "imu_buffer.hpp"
 #include "imu_intake.hpp"
@@ -61,6 +62,7 @@ struct LioMapper::Impl {
         decoder(config.sweep),
         intake(robot.q_base_imu()),
         imu_rate(config.imu, config.imu_rate_odometry_hz),
+        calibration_report(config, T_base_lidar),
         keyframe_trigger(config.keyframes) {}
 
   void begin_stage(Stage stage) const {
@@ -96,6 +98,7 @@ struct LioMapper::Impl {
   std::deque<Sweep> sweeps;
   std::optional<ScanFilter> filter;
   ImuRateOdometry imu_rate;
+  CalibrationReport calibration_report;
   KeyframeTrigger keyframe_trigger;
   std::uint64_t next_keyframe{0};
   LioStatus status;
@@ -220,6 +223,7 @@ void LioMapper::Impl::process_front(Output& output) {
   filter->insert(outcome);
   begin_stage(Stage::kReport);
   judge_health(outcome, sweep.end_ns, output);
+  calibration_report.look(filter->calibration(), sweep.end_ns, output.events);
   report(outcome, output);
   sweeps.pop_front();
   imu.forget_before(filter->stamp_ns());
@@ -442,6 +446,15 @@ std::size_t LioMapper::map_memory_bytes() const {
 
 PointCloud LioMapper::local_map() const {
   return impl_->filter ? impl_->filter->map().points() : PointCloud{};
+}
+
+Calibration LioMapper::calibration() const {
+  if (impl_->filter) {
+    return impl_->filter->calibration();
+  }
+  Calibration configured;
+  configured.T_base_lidar = impl_->T_base_lidar;
+  return configured;
 }
 
 LioStatus LioMapper::status() const {

@@ -7,6 +7,8 @@
 #include "downsample.hpp"
 #include "scan_matcher.hpp"
 #include "undistortion.hpp"
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
 #include <utility>
@@ -26,6 +28,24 @@ constexpr double kLeastMotion_m = 0.005;
 /// A scan is put into the map unmatched only while its pose relative to the map is this certain.
 constexpr double kMapSigma_m = 0.3;
 
+InitialState with_extrinsic(InitialState initial,
+                            const Pose& T_base_lidar,
+                            const ExtrinsicConfig& config) {
+  initial.state.T_base_lidar = T_base_lidar;
+  auto& P = initial.covariance;
+  P.middleRows<6>(error::kExtrinsicRotation).setZero();
+  P.middleCols<6>(error::kExtrinsicRotation).setZero();
+  if (config.estimate) {
+    P.diagonal()
+        .segment<3>(error::kExtrinsicRotation)
+        .setConstant(config.rotation_sigma_rad * config.rotation_sigma_rad);
+    P.diagonal()
+        .segment<3>(error::kExtrinsicPosition)
+        .setConstant(config.position_sigma_m * config.position_sigma_m);
+  }
+  return initial;
+}
+
 PointCloud transformed(const PointCloud& points, const Pose& T) {
   const Eigen::Matrix3f R = T.q.toRotationMatrix().cast<float>();
   const Eigen::Vector3f t = T.p.cast<float>();
@@ -43,6 +63,27 @@ IterationLimits limits_of(const MatchingConfig& config) {
           config.converged_position_m,
           config.converged_rotation_rad,
           static_cast<std::size_t>(config.min_matches)};
+}
+
+/// Attitudes of scans less certain than this say nothing about clocks.
+constexpr double kAttitudeSigma_rad = 2e-3;
+
+/// The attitude that the residuals alone ask for, whatever the prior; nullopt where they leave a
+/// direction open.
+std::optional<Eigen::Quaterniond> attitude_of_scan(const UpdateResult& result) {
+  const Matrix6d& A = result.measured.information;
+  const Vector6d& g = result.measured.gradient;
+  // Along directions in which position is open too, it is left where it is.
+  const Matrix3d A_pp =
+      A.topLeftCorner<3, 3>() + 1e-9 * A.topLeftCorner<3, 3>().trace() * Matrix3d::Identity();
+  const Matrix3d by_position = A_pp.ldlt().solve(A.topRightCorner<3, 3>()).transpose();
+  const Matrix3d S = A.bottomRightCorner<3, 3>() - by_position * A.topRightCorner<3, 3>();
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(S);
+  if (!(eigen.eigenvalues()[0] > 1.0 / (kAttitudeSigma_rad * kAttitudeSigma_rad))) {
+    return std::nullopt;
+  }
+  const Vector3d turn_rad = -S.ldlt().solve(g.tail<3>() - by_position * g.head<3>());
+  return (result.measured_at.q * so3_exp(turn_rad)).normalized();
 }
 
 /// Jacobian of the pose error of T * pose (position, heading) by the error of T = (yaw, x, y, z).
@@ -92,7 +133,7 @@ ScanFilter::ScanFilter(const Config& config,
                        StageObserver observe)
     : config_(config),
       T_base_lidar_(T_base_lidar),
-      initial_(initial),
+      initial_(with_extrinsic(initial, T_base_lidar, config.extrinsic)),
       observe_(std::move(observe)),
       workers_(std::make_unique<Workers>(static_cast<std::size_t>(config.matching.threads))),
       map_(make_local_map(config.local_map)),
@@ -146,20 +187,38 @@ void ScanFilter::add_drift(Prediction& prediction) {
   add_drift_noise(config_.drift, moved_m, prediction.state, aligned_, prediction.covariance);
 }
 
+UpdateResult ScanFilter::update(const Prediction& prediction, ScanMatcher& matcher) {
+  const IterationLimits limits = limits_of(config_.matching);
+  const auto timed = [&](const auto& linearise) {
+    begin(Stage::kMatch);
+    auto information = linearise();
+    begin(Stage::kSolve);
+    return information;
+  };
+  if (!config_.extrinsic.estimate) {
+    return iterated_update(
+        prediction.state,
+        prediction.covariance,
+        [&](const Pose& T_odom_base) {
+          return timed([&] { return matcher.linearise(T_odom_base); });
+        },
+        limits);
+  }
+  return iterated_update_with_extrinsic(
+      prediction.state,
+      prediction.covariance,
+      [&](const Pose& T_odom_base, const Pose& T_base_lidar) {
+        return timed([&] { return matcher.linearise(T_odom_base, T_base_lidar, origins_); });
+      },
+      limits);
+}
+
 UpdateResult ScanFilter::match(const Prediction& prediction,
                                const PointCloud& thinned_base,
                                ScanOutcome& outcome) {
-  ScanMatcher matcher(thinned_base, *map_, T_base_lidar_.p, config_.matching, *workers_);
-  UpdateResult result = iterated_update(
-      prediction.state,
-      prediction.covariance,
-      [&](const Pose& T_odom_base) {
-        begin(Stage::kMatch);
-        const PoseInformation information = matcher.linearise(T_odom_base);
-        begin(Stage::kSolve);
-        return information;
-      },
-      limits_of(config_.matching));
+  ScanMatcher matcher(
+      thinned_base, *map_, prediction.state.T_base_lidar, config_.matching, *workers_);
+  UpdateResult result = update(prediction, matcher);
   outcome.used = result.used;
   outcome.matches = result.count;
   outcome.iterations = result.iterations;
@@ -174,6 +233,18 @@ void ScanFilter::begin(Stage stage) const {
   }
 }
 
+void ScanFilter::compare_clocks(const UpdateResult& result,
+                                Nanoseconds stamp_ns,
+                                const ImuBuffer& imu) {
+  const auto attitude = result.used ? attitude_of_scan(result) : std::nullopt;
+  const bool gap = imu.longest_gap_s(this->stamp_ns(), stamp_ns) > config_.imu.max_gap_s;
+  if (attitude && !gap) {
+    clock_offset_.add(stamp_ns, *attitude, result.state.gyro_bias_radps, imu);
+  } else {
+    clock_offset_.interrupt();
+  }
+}
+
 ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu) {
   begin(Stage::kPredict);
   Prediction prediction = predict(sweep, imu);
@@ -181,7 +252,7 @@ ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu) {
 
   ScanOutcome outcome;
   begin(Stage::kUndistort);
-  outcome.points_base = undistort(sweep, prediction.path, T_base_lidar_);
+  outcome.points_base = undistort(sweep, prediction.path, prediction.state.T_base_lidar);
   begin(Stage::kDownsample);
   outcome.thinned_base = downsample(outcome.points_base, config_.matching.voxel_m);
   outcome.points = outcome.thinned_base.size();
@@ -197,9 +268,15 @@ ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu) {
     outcome.used = outcome.points >= static_cast<std::size_t>(config_.matching.min_matches);
   } else {
     const UpdateResult result = match(prediction, outcome.thinned_base, outcome);
+    compare_clocks(result, sweep.end_ns, imu);
     record.before_rows = result.state;
     record.covariance_before_rows = result.covariance;
     record.transition = result.transition * prediction.transition;
+    if (config_.extrinsic.estimate) {
+      const Pose T_base_base = result.state.T_base_lidar * prediction.state.T_base_lidar.inverse();
+      outcome.points_base = transformed(outcome.points_base, T_base_base);
+      outcome.thinned_base = transformed(outcome.thinned_base, T_base_base);
+    }
   }
   record.path = std::move(prediction.path);
   history_.push(std::move(record));
@@ -211,12 +288,34 @@ void ScanFilter::insert(const ScanOutcome& outcome) {
   const Vector3d& p = state().T_odom_base.p;
   const double sigma2 = covariance().diagonal().head<3>().maxCoeff();
   if (outcome.used || sigma2 < kMapSigma_m * kMapSigma_m) {
-    map_->insert(transformed(outcome.thinned_base, state().T_odom_base));
+    const PointCloud points_odom = transformed(outcome.thinned_base, state().T_odom_base);
+    map_->insert(points_odom);
+    if (config_.extrinsic.estimate) {
+      origins_.insert(points_odom, state().T_odom_base, state().T_base_lidar);
+    }
   }
   if ((p - pruned_at_m_).norm() > config_.local_map.prune_every_m) {
     map_->prune(p, config_.local_map.half_side_m);
+    origins_.prune(p, config_.local_map.half_side_m);
     pruned_at_m_ = p;
   }
+}
+
+Calibration ScanFilter::calibration() const {
+  Calibration calibration;
+  calibration.T_base_lidar = state().T_base_lidar;
+  // The filter has the rotation first.
+  Eigen::Matrix<double, 6, 6> swap = Eigen::Matrix<double, 6, 6>::Zero();
+  swap.topRightCorner<3, 3>().setIdentity();
+  swap.bottomLeftCorner<3, 3>().setIdentity();
+  calibration.extrinsic_covariance =
+      swap * covariance().block<6, 6>(error::kExtrinsicRotation, error::kExtrinsicRotation) *
+      swap.transpose();
+  if (const auto clock = clock_offset_.estimate()) {
+    calibration.clock_offset_s = clock->offset_s;
+    calibration.clock_offset_sigma_s = clock->sigma_s;
+  }
+  return calibration;
 }
 
 void ScanFilter::align(const Alignment& alignment) {

@@ -4,11 +4,14 @@
 
 #include "trigpoint/base/measurements.hpp"
 #include "trigpoint/lio_mapper/config.hpp"
+#include "trigpoint/lio_mapper/lio_mapper.hpp"
 #include "trigpoint/lio_mapper/stages.hpp"
 
+#include "clock_offset.hpp"
 #include "imu_buffer.hpp"
 #include "iterated_update.hpp"
 #include "local_map.hpp"
+#include "map_origins.hpp"
 #include "row_history.hpp"
 #include "sweep.hpp"
 #include "workers.hpp"
@@ -18,7 +21,9 @@
 
 namespace trigpoint::lio_mapper {
 
-/// Where the filter begins.
+class ScanMatcher;
+
+/// Where the filter begins; T_base_lidar is the filter's own matter.
 struct InitialState {
   Nanoseconds stamp_ns{0};
   State state;
@@ -34,7 +39,7 @@ struct ScanOutcome {
   int iterations{0};
   double share_within_10_cm{0.0};  ///< of the thinned points, from their planes
   std::array<double, 6> observability{};
-  PointCloud points_base;   ///< undistorted, all
+  PointCloud points_base;   ///< undistorted, all; with the extrinsic that this scan ended with
   PointCloud thinned_base;  ///< undistorted, one a voxel
 };
 
@@ -54,6 +59,8 @@ class ScanFilter {
   Nanoseconds stamp_ns() const;
   const State& state() const;
   const ErrorMatrix& covariance() const;
+
+  Calibration calibration() const;
 
   bool aligned() const { return aligned_; }
 
@@ -96,6 +103,8 @@ class ScanFilter {
   UpdateResult match(const Prediction& prediction,
                      const PointCloud& thinned_base,
                      ScanOutcome& outcome);
+  void compare_clocks(const UpdateResult& result, Nanoseconds stamp_ns, const ImuBuffer& imu);
+  UpdateResult update(const Prediction& prediction, ScanMatcher& matcher);
 
   Config config_;
   Pose T_base_lidar_;
@@ -103,6 +112,8 @@ class ScanFilter {
   StageObserver observe_;
   std::unique_ptr<Workers> workers_;
   std::unique_ptr<LocalMap> map_;
+  MapOrigins origins_;  ///< empty unless the extrinsic is estimated
+  ClockOffsetEstimator clock_offset_;
   RowHistory history_;
   bool aligned_{false};
   double distance_m_{0.0};

@@ -208,7 +208,7 @@ TEST(ScanMatcher, gradient_and_information_are_the_derivatives_of_the_cost) {
   config.range_sigma_m = 0.02;
   config.angle_sigma_rad = 0.0;
   const Pose T{so3_exp({0.01, -0.02, 0.015}), {0.02, -0.03, 0.01}};
-  ScanMatcher matcher(points, map, Eigen::Vector3d::Zero(), config, workers);
+  ScanMatcher matcher(points, map, Pose{}, config, workers);
   const PoseInformation info = matcher.linearise(T);
   EXPECT_EQ(info.count, points.size());
 
@@ -244,9 +244,9 @@ TEST(ScanMatcher, many_residuals_weigh_as_much_as_the_independent_ones_only) {
   const RoomMap map;
   MatchingConfig config;
   config.independent_residuals = 300.0;
-  ScanMatcher all(points, map, Eigen::Vector3d::Zero(), config, workers);
+  ScanMatcher all(points, map, Pose{}, config, workers);
   points.resize(300);
-  ScanMatcher few(points, map, Eigen::Vector3d::Zero(), config, workers);
+  ScanMatcher few(points, map, Pose{}, config, workers);
   EXPECT_NEAR(all.linearise({}).information(0, 0) / few.linearise({}).information(0, 0), 1.0, 1e-9);
 }
 
@@ -260,13 +260,13 @@ TEST(ScanMatcher, sums_to_the_same_bits_on_any_number_of_threads) {
   const RoomMap map;
   const MatchingConfig config;
   const Pose T{so3_exp({0.01, -0.02, 0.015}), {0.02, -0.03, 0.01}};
-  ScanMatcher alone(points, map, Eigen::Vector3d::Zero(), config, workers);
+  ScanMatcher alone(points, map, Pose{}, config, workers);
   const PoseInformation expected = alone.linearise(T);
   ASSERT_GT(expected.count, 1000U);
   for (const std::size_t threads : {2U, 3U, 7U}) {
     Workers several(threads);
     for (int run = 0; run < 20; ++run) {
-      ScanMatcher matcher(points, map, Eigen::Vector3d::Zero(), config, several);
+      ScanMatcher matcher(points, map, Pose{}, config, several);
       const PoseInformation info = matcher.linearise(T);
       ASSERT_EQ(info.count, expected.count);
       ASSERT_EQ(info.information, expected.information);

@@ -78,6 +78,13 @@ struct MatchingConfig {
   double lost_after_s{2.0};  ///< coasting longer than this is LOST
 };
 
+/// Estimation of where the LiDAR sits, about the configured place.
+struct ExtrinsicConfig {
+  bool estimate{false};
+  double rotation_sigma_rad{0.03};
+  double position_sigma_m{0.05};
+};
+
 struct LocalMapConfig {
   double half_side_m{150.0};  ///< of the cube around the robot that is kept
   double prune_every_m{10.0};
@@ -111,6 +118,7 @@ struct Config {
   ImuConfig imu;
   StartConfig start;
   MatchingConfig matching;
+  ExtrinsicConfig extrinsic;
   LocalMapConfig local_map;
   DriftConfig drift;
   RowsConfig rows;
