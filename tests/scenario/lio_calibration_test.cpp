@@ -14,6 +14,7 @@ namespace trigpoint {
 namespace {
 
 constexpr int kSeeds = 3;
+constexpr double kClockTolerance_ms = 2.0;
 constexpr double kDegree = 3.14159265358979 / 180.0;
 
 Eigen::Matrix<double, 6, 1> extrinsic_error(const lio_mapper::Calibration& calibration,
@@ -38,7 +39,9 @@ LioDriveOptions estimating(bool estimate, bool wrong) {
   return options;
 }
 
-TEST(Extrinsic, table) {
+/// Prints; asserts nothing about the estimate's sigma, which is far too small (README,
+/// Calibration): that is why it is off by default.
+TEST(Extrinsic, table_of_right_and_wrong_configurations) {
   const simulator::Scenario scenario = simulator::load_scenario("campus");
   std::printf(
       "right/wrong est  seed  mean m   level   up  | roll pitch yaw deg (sigma) | x y z cm "
@@ -94,7 +97,7 @@ TEST(Extrinsic, table) {
   }
 }
 
-TEST(LidarClock, table) {
+TEST(LidarClock, offset_is_found_within_two_milliseconds_and_warned_about_only_when_there_is_one) {
   const std::vector<double> offsets_ms{-30.0, -10.0, 0.0, 10.0, 30.0};
   const auto drives = drive_lio_all(static_cast<int>(offsets_ms.size()), [&](int i) {
     LioDriveOptions options;
@@ -117,6 +120,8 @@ TEST(LidarClock, table) {
                   1e3 * at->calibration.clock_offset_sigma_s);
     }
     std::printf("  %s\n", drive.said("lidar_clock_offset") ? "warned" : "");
+    EXPECT_NEAR(1e3 * drive.calibration.clock_offset_s, offsets_ms[i], kClockTolerance_ms);
+    EXPECT_EQ(drive.said("lidar_clock_offset"), offsets_ms[i] != 0.0);
   }
 }
 

@@ -222,6 +222,11 @@ void describe(Config& config, ConfigFields& fields) {
                             config.drift.tilt_sigma_rad_sqrtm,
                             "sigma of roll and of pitch against gravity after one metre",
                             kNotNegative);
+                   f.number("map_renewal_per_m",
+                            config.drift.map_renewal_per_m,
+                            "share of the pose's covariance relative to the local map that new map "
+                            "inherits, per metre",
+                            kNotNegative);
                  });
   fields.section("rows", "GPS rows from the gate", [&](ConfigFields& f) {
     f.number("history_s", config.rows.history_s, "how late a row may come", kPositive);

@@ -2,6 +2,8 @@
 // Copyright the Trigpoint developers
 #include "imu_rate_odometry.hpp"
 
+#include <algorithm>
+
 namespace trigpoint::lio_mapper {
 
 using Eigen::Matrix3d;
@@ -62,8 +64,10 @@ void ImuRateOdometry::catch_up(const ImuBuffer& imu) {
   }
   const bool gap = imu.longest_gap_s(stamp_ns_, imu.newest_ns()) > imu_.max_gap_s;
   for (const InertialStep& step : imu.steps_between(stamp_ns_, imu.newest_ns(), kLongestStep_s)) {
-    propagate_covariance(
-        step_jacobian(state_, step), imu_, gap ? imu_.gap_noise_factor : 1.0, covariance_);
+    propagate_covariance(step_jacobian(state_, step),
+                         imu_,
+                         std::max(gap ? imu_.gap_noise_factor : 1.0, step.noise_factor()),
+                         covariance_);
     state_ = propagate(state_, step);
   }
   stamp_ns_ = imu.newest_ns();

@@ -33,6 +33,9 @@ constexpr double kKeptBeforeStart_s = 5.0;
 /// A pose less certain than this relative to the local map is not a good one.
 constexpr double kDegradedSigma_m = 0.3;
 
+/// So long after the last usable scan it is said that there is none.
+constexpr double kBlind_s = 0.5;
+
 std::string seconds_text(Nanoseconds duration_ns) {
   return std::to_string(to_seconds(duration_ns)) + " s";
 }
@@ -86,6 +89,7 @@ struct LioMapper::Impl {
   void align(const Alignment& alignment, Nanoseconds stamp_ns, Output& output);
   void count_row(const StateUpdate& update, const RowVerdict& verdict, Output& output);
   void judge_health(const ScanOutcome& outcome, Nanoseconds stamp_ns, Output& output);
+  void judge_absence(Nanoseconds stamp_ns, Output& output);
   void report(const ScanOutcome& outcome, Output& output);
   Keyframe make_keyframe(const ScanOutcome& outcome, const Odometry& odometry);
   void refresh_status();
@@ -260,6 +264,23 @@ void LioMapper::Impl::judge_health(const ScanOutcome& outcome,
            (good ? "" : "; going on with the IMU alone where the scan does not help")});
 }
 
+/// Without any scan to judge: the LiDAR is covered, dead, or its sweeps are refused.
+void LioMapper::Impl::judge_absence(Nanoseconds stamp_ns, Output& output) {
+  const double blind_s = to_seconds(stamp_ns - last_used_ns);
+  if (!filter || blind_s < kBlind_s || status.health == LioHealth::kLost) {
+    return;
+  }
+  const LioHealth before = status.health;
+  status.health = blind_s > config.matching.lost_after_s ? LioHealth::kLost : LioHealth::kDegraded;
+  if (status.health != before) {
+    output.events.push_back(
+        {Severity::kWarning,
+         stamp_ns,
+         status.health == LioHealth::kLost ? "lio_lost" : "lio_degraded",
+         "no usable scan for " + std::to_string(blind_s) + " s; going on with the IMU alone"});
+  }
+}
+
 void LioMapper::Impl::refresh_status() {
   status.imu_received = intake.received();
   status.scans_refused = refused_scans.counts();
@@ -392,6 +413,7 @@ Output LioMapper::on_imu(const ImuSample& sample) {
         from_seconds(kKeptBeforeStart_s));
   }
   impl_->process_what_is_covered(output);
+  impl_->judge_absence(accepted->stamp_ns, output);
   output.odometry_imu_rate = impl_->imu_rate.advance(impl_->imu);
   return output;
 }

@@ -48,7 +48,8 @@ InertialSample interpolate(const InertialSample& a, const InertialSample& b, Nan
   const double fraction = to_seconds(stamp_ns - a.stamp_ns) / to_seconds(b.stamp_ns - a.stamp_ns);
   return {stamp_ns,
           a.gyro_radps + fraction * (b.gyro_radps - a.gyro_radps),
-          a.accel_mps2 + fraction * (b.accel_mps2 - a.accel_mps2)};
+          a.accel_mps2 + fraction * (b.accel_mps2 - a.accel_mps2),
+          a.saturated || b.saturated};
 }
 
 State propagate(const State& state, const InertialStep& step) {

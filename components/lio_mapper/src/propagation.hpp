@@ -20,6 +20,7 @@ struct InertialSample {
   Nanoseconds stamp_ns{0};
   Eigen::Vector3d gyro_radps{Eigen::Vector3d::Zero()};
   Eigen::Vector3d accel_mps2{Eigen::Vector3d::Zero()};
+  bool saturated{false};  ///< an axis stands at the end of its range: the truth lies beyond
 };
 
 /// The sample between two others, linearly.
@@ -29,6 +30,9 @@ InertialSample interpolate(const InertialSample& a, const InertialSample& b, Nan
 struct InertialStep {
   InertialSample begin;
   InertialSample end;
+
+  /// Of noise densities; over a sweep it lets a saturated gyro be wrong by some tenths of a rad/s.
+  double noise_factor() const { return begin.saturated || end.saturated ? 100.0 : 1.0; }
 
   double duration_s() const { return to_seconds(end.stamp_ns - begin.stamp_ns); }
 };

@@ -11,6 +11,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
+#include <algorithm>
 #include <utility>
 
 namespace trigpoint::lio_mapper {
@@ -86,31 +87,41 @@ std::optional<Eigen::Quaterniond> attitude_of_scan(const UpdateResult& result) {
   return (result.measured_at.q * so3_exp(turn_rad)).normalized();
 }
 
-/// Jacobian of the pose error of T * pose (position, heading) by the error of T = (yaw, x, y, z).
-Eigen::Matrix<double, 6, 4> pose_by_transform(double yaw_rad, const Vector3d& p_odom_m) {
-  Eigen::Matrix<double, 6, 4> jacobian = Eigen::Matrix<double, 6, 4>::Zero();
-  jacobian.topLeftCorner<3, 1>() = Vector3d::UnitZ().cross(from_yaw(yaw_rad) * p_odom_m);
-  jacobian.topRightCorner<3, 3>().setIdentity();
-  jacobian(5, 0) = 1.0;
+/// By how much a pose at `p` moves with a displacement of odom that is expressed about its origin,
+/// ROS order; -p is the way back.
+Matrix6d transport(const Vector3d& p_odom_m) {
+  Matrix6d jacobian = Matrix6d::Identity();
+  jacobian.topRightCorner<3, 3>() = -hat(p_odom_m);
   return jacobian;
 }
 
 }  // namespace
 
-Matrix4d drift_noise(const DriftConfig& drift,
+DriftRate drift_rate(const DriftConfig& drift, const Matrix6d& local) {
+  const double inherited = drift.map_renewal_per_m;
+  const auto square = [](double x) { return x * x; };
+  DriftRate rate;
+  rate.position_m2 = square(drift.position_sigma_m_sqrtm) * Matrix3d::Identity() +
+                     inherited * local.topLeftCorner<3, 3>();
+  rate.tilt_rad2 = square(drift.tilt_sigma_rad_sqrtm) * Eigen::Matrix2d::Identity() +
+                   inherited * local.block<2, 2>(3, 3);
+  rate.yaw_rad2 = square(drift.yaw_sigma_rad_sqrtm) + inherited * local(5, 5);
+  return rate;
+}
+
+Matrix4d drift_noise(const DriftRate& rate,
                      double distance_m,
                      const Matrix3d& R_frame_odom,
                      const Vector3d& p_odom_m) {
-  const double position2 = drift.position_sigma_m_sqrtm * drift.position_sigma_m_sqrtm * distance_m;
-  const double yaw2 = drift.yaw_sigma_rad_sqrtm * drift.yaw_sigma_rad_sqrtm * distance_m;
   Eigen::Vector4d turn = Eigen::Vector4d::UnitX();
   turn.tail<3>() = -Vector3d::UnitZ().cross(R_frame_odom * p_odom_m);
-  Matrix4d noise = yaw2 * turn * turn.transpose();
-  noise.bottomRightCorner<3, 3>().diagonal().array() += position2;
+  Matrix4d noise = rate.yaw_rad2 * distance_m * turn * turn.transpose();
+  noise.bottomRightCorner<3, 3>() +=
+      distance_m * R_frame_odom * rate.position_m2 * R_frame_odom.transpose();
   return noise;
 }
 
-void add_drift_noise(const DriftConfig& drift,
+void add_drift_noise(const DriftRate& rate,
                      double distance_m,
                      const State& state,
                      bool aligned,
@@ -121,10 +132,10 @@ void add_drift_noise(const DriftConfig& drift,
     const Vector3d& p_odom_m = state.T_odom_base.p;
     tilt.middleRows<3>(error::kPositionMapOdom) = -placed_point_by_gravity(state, p_odom_m);
     covariance.block<4, 4>(error::kYawMapOdom, error::kYawMapOdom) +=
-        drift_noise(drift, distance_m, state.placement().pose().q.toRotationMatrix(), p_odom_m);
+        drift_noise(rate, distance_m, state.placement().pose().q.toRotationMatrix(), p_odom_m);
   }
-  const double tilt2 = drift.tilt_sigma_rad_sqrtm * drift.tilt_sigma_rad_sqrtm * distance_m;
-  covariance += tilt2 * tilt * tilt.transpose();
+  // The gravity errors turn about odom's x and y as long as odom is nearly level.
+  covariance += distance_m * tilt * rate.tilt_rad2 * tilt.transpose();
 }
 
 ScanFilter::ScanFilter(const Config& config,
@@ -165,7 +176,8 @@ ScanFilter::Prediction ScanFilter::predict(const Sweep& sweep, const ImuBuffer& 
     node.angular_radps =
         0.5 * (step.begin.gyro_radps + step.end.gyro_radps) - prediction.state.gyro_bias_radps;
     prediction.path.push_back(node);
-    propagate_covariance(jacobian, config_.imu, noise_factor, prediction.covariance);
+    propagate_covariance(
+        jacobian, config_.imu, std::max(noise_factor, step.noise_factor()), prediction.covariance);
     apply_transition(jacobian, prediction.transition);
     prediction.state = next;
     node.stamp_ns = step.end.stamp_ns;
@@ -182,9 +194,14 @@ void ScanFilter::add_drift(Prediction& prediction) {
     return;
   }
   distance_m_ += moved_m;
-  const Vector3d& p = prediction.state.T_odom_base.p;
-  drift_covariance_ += drift_noise(config_.drift, moved_m, Matrix3d::Identity(), p);
-  add_drift_noise(config_.drift, moved_m, prediction.state, aligned_, prediction.covariance);
+  const DriftRate rate = drift_rate(config_.drift, pose_covariance_in_local_map());
+  Matrix6d at_robot = Matrix6d::Zero();
+  at_robot.topLeftCorner<3, 3>() = moved_m * rate.position_m2;
+  at_robot.block<2, 2>(3, 3) = moved_m * rate.tilt_rad2;
+  at_robot(5, 5) = moved_m * rate.yaw_rad2;
+  const Matrix6d to_origin = transport(-prediction.state.T_odom_base.p);
+  drift_covariance_ += to_origin * at_robot * to_origin.transpose();
+  add_drift_noise(rate, moved_m, prediction.state, aligned_, prediction.covariance);
 }
 
 UpdateResult ScanFilter::update(const Prediction& prediction, ScanMatcher& matcher) {
@@ -344,7 +361,7 @@ Matrix6d ScanFilter::placement_covariance() const {
 }
 
 Matrix6d ScanFilter::pose_covariance() const {
-  const auto jacobian = pose_by_transform(0.0, state().T_odom_base.p);
+  const Matrix6d jacobian = transport(state().T_odom_base.p);
   return pose_covariance_in_local_map() + jacobian * drift_covariance_ * jacobian.transpose();
 }
 

@@ -128,9 +128,12 @@ void ScanMatcher::add(Residual& r, const Viewpoint& view, PoseAndExtrinsicInform
     foot_odom_m = T_odom_lidar * foot_lidar_m;
     const Vector3d normal_base = view.R_odom_base.transpose() * normal;
     const Vector3d point_lidar_m = T_base_lidar_.inverse() * r.point_base_m;
+    const Vector3d normal_lidar = T_odom_lidar.q.conjugate() * normal;
+    // The last term: the plane turns.
     h.segment<3>(error::kExtrinsicRotation) =
         point_lidar_m.cross(view.T_base_lidar.q.conjugate() * normal_base) -
-        foot_lidar_m.cross(T_odom_lidar.q.conjugate() * normal);
+        foot_lidar_m.cross(normal_lidar) +
+        normal_lidar.cross(T_odom_lidar.q.conjugate() * (point_odom_m - foot_odom_m));
     h.segment<3>(error::kExtrinsicPosition) = normal_base - T_odom_then.q.conjugate() * normal;
   }
   const Vector3d normal_base = view.R_odom_base.transpose() * normal;

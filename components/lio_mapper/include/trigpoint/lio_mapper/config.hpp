@@ -98,6 +98,8 @@ struct DriftConfig {
   double position_sigma_m_sqrtm{0.02};
   double yaw_sigma_rad_sqrtm{3.5e-4};
   double tilt_sigma_rad_sqrtm{1e-4};
+  /// Share of the pose's covariance relative to the local map that the map inherits per metre.
+  double map_renewal_per_m{0.0};
 };
 
 struct RowsConfig {
