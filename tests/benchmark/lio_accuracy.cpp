@@ -15,7 +15,9 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <fstream>
 #include <map>
+#include <stdexcept>
 #include <string>
 #include <variant>
 #include <vector>
@@ -98,7 +100,25 @@ Score score_of(const Run& run, const simulator::Truth& truth) {
   return score;
 }
 
-std::map<std::string, Score> drive(const cli::InputOptions& options) {
+/// Where it drifts: error of the change of pose over each second, a line a scan.
+void trace(std::ofstream& file,
+           const std::string& drive,
+           const Run& run,
+           const std::string& kind,
+           const simulator::Truth& truth) {
+  constexpr std::size_t kScans = 10;
+  for (std::size_t i = kScans; i < run.trajectory.size(); ++i) {
+    const auto& [from_ns, from] = run.trajectory[i - kScans];
+    const auto& [to_ns, to] = run.trajectory[i];
+    const Pose true_step = truth.at(from_ns).T_map_base.inverse() * truth.at(to_ns).T_map_base;
+    const Pose error = true_step.inverse() * (from.inverse() * to);
+    file << drive << ',' << kind << ',' << to_seconds(to_ns - run.trajectory.front().stamp_ns) << ','
+         << true_step.p.norm() << ',' << error.p.x() << ',' << error.p.y() << ',' << error.p.z()
+         << ',' << so3_log(error.q).norm() << '\n';
+  }
+}
+
+std::map<std::string, Score> drive(const cli::InputOptions& options, std::ofstream& traces) {
   cli::Input input = cli::open_input(options);
   std::map<std::string, Run> runs;
   for (const char* kind : kKinds) {
@@ -120,6 +140,13 @@ std::map<std::string, Score> drive(const cli::InputOptions& options) {
   for (auto& [kind, run] : runs) {
     run.take(run.mapper.finish());
     scores[kind] = score_of(run, *scenario.truth());
+    if (traces.is_open()) {
+      trace(traces,
+            options.log + " seed " + std::to_string(options.seed.value_or(0)),
+            run,
+            kind,
+            *scenario.truth());
+    }
   }
   return scores;
 }
@@ -162,6 +189,8 @@ int main(int argc, char** argv) {
   app.add_option("--beams", beams, "16, 32, 64");
   app.add_option("--seed", seeds, "one run for each");
   app.add_option("--duration", options.duration_s, "only so much of each drive, s");
+  std::string trace_file;
+  app.add_option("--trace", trace_file, "CSV of the error over each second, a line a scan");
   trigpoint::cli::add_config_options(app, options);
   CLI11_PARSE(app, argc, argv);
   std::printf(
@@ -169,6 +198,14 @@ int main(int argc, char** argv) {
       "m | z m | levelled xy m | z m | z / xy | tilt deg | refused |\n"
       "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   try {
+    std::ofstream traces;
+    if (!trace_file.empty()) {
+      traces.open(trace_file);
+      if (!traces) {
+        throw std::runtime_error(trace_file + ": cannot be written");
+      }
+      traces << "drive,map,time_s,moved_m,error_x_m,error_y_m,error_z_m,turn_error_rad\n";
+    }
     double surfel_m = 0.0;
     double ikd_m = 0.0;
     double worst_m = -1e9;
@@ -178,7 +215,7 @@ int main(int argc, char** argv) {
           options.log = scenario;
           options.changes.beams = n;
           options.seed = seed;
-          const auto scores = drive(options);
+          const auto scores = drive(options, traces);
           for (const auto& [kind, score] : scores) {
             print(scenario, n, seed, kind, score);
           }

@@ -59,8 +59,11 @@ void describe_imu(ImuConfig& c, ConfigFields& f) {
            kPositive);
   f.number(
       "lost_gap_s", c.lost_gap_s, "a sweep that touches a longer interval is refused", kPositive);
-  f.number(
-      "gap_noise_factor", c.gap_noise_factor, "on the noise densities inside a gap", kPositive);
+  f.number("gap_accel_mps2",
+           c.gap_accel_mps2,
+           "by how much the bridged acceleration may be wrong in a gap (one sigma)",
+           kNotNegative);
+  f.number("gap_gyro_radps", c.gap_gyro_radps, "the same of the turn rate", kNotNegative);
 }
 
 void describe_start(StartConfig& c, ConfigFields& f) {
@@ -109,6 +112,20 @@ void describe_matching(MatchingConfig& c, ConfigFields& f) {
            c.lost_after_s,
            "time without a usable scan after which the track is lost",
            kPositive);
+}
+
+void describe_extrinsic(ExtrinsicConfig& c, ConfigFields& f) {
+  f.flag("estimate",
+         c.estimate,
+         "whether robot.lidar_* are where the estimate starts (true) or taken as exact (false)");
+  f.number("rotation_sigma_rad",
+           c.rotation_sigma_rad,
+           "how well the configured rotation is known, each axis",
+           kNotNegative);
+  f.number("position_sigma_m",
+           c.position_sigma_m,
+           "how well the configured position is known, each axis",
+           kNotNegative);
 }
 
 void describe_surfel_map(SurfelMapConfig& c, ConfigFields& f) {
@@ -209,6 +226,9 @@ void describe(Config& config, ConfigFields& fields) {
   fields.section("matching", "scan against local map", [&](ConfigFields& f) {
     describe_matching(config.matching, f);
   });
+  fields.section("extrinsic", "where the LiDAR sits on base_link", [&](ConfigFields& f) {
+    describe_extrinsic(config.extrinsic, f);
+  });
   fields.section("local_map", "what scans are matched against", [&](ConfigFields& f) {
     describe_local_map(config.local_map, f);
   });
@@ -226,6 +246,11 @@ void describe(Config& config, ConfigFields& fields) {
                    f.number("tilt_sigma_rad_sqrtm",
                             config.drift.tilt_sigma_rad_sqrtm,
                             "sigma of roll and of pitch against gravity after one metre",
+                            kNotNegative);
+                   f.number("map_renewal_per_m",
+                            config.drift.map_renewal_per_m,
+                            "share of the pose's covariance relative to the local map that new map "
+                            "inherits, per metre",
                             kNotNegative);
                  });
   fields.section("rows", "GPS rows from the gate", [&](ConfigFields& f) {

@@ -3,6 +3,7 @@
 #include "imu_intake.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace trigpoint::lio_mapper {
 
@@ -11,6 +12,12 @@ namespace {
 /// No robot turns or accelerates like that: 5700 deg/s and 50 g.
 constexpr double kMaxGyro_radps = 100.0;
 constexpr double kMaxForce_mps2 = 500.0;
+/// No range ends below these; a robot at rest shows the same reading again and again.
+constexpr double kLeastGyroRange_radps = 0.25;
+constexpr double kLeastForceRange_mps2 = 10.8;
+constexpr int kRepeats = 3;
+constexpr int kChanges = 50;  ///< that show the axis to have noise
+constexpr double kSaturationEvery_s = 5.0;
 
 }  // namespace
 
@@ -22,6 +29,26 @@ void Tally::add(const std::string& reason) {
   } else {
     ++known->count;
   }
+}
+
+bool SaturationCheck::add(double value, double least, Axis& axis) {
+  const double magnitude = std::abs(value);
+  axis.repeats = value == axis.last ? axis.repeats + 1 : 1;
+  axis.changes += value == axis.last ? 0 : 1;
+  axis.last = value;
+  axis.largest = std::max(axis.largest, magnitude);
+  return magnitude > least && magnitude == axis.largest && axis.repeats >= kRepeats &&
+         axis.changes > kChanges;
+}
+
+bool SaturationCheck::add(const Eigen::Vector3d& gyro_radps, const Eigen::Vector3d& accel_mps2) {
+  bool any = false;
+  for (int i = 0; i < 3; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    any = add(gyro_radps[i], kLeastGyroRange_radps, axes_[at]) || any;
+    any = add(accel_mps2[i], kLeastForceRange_mps2, axes_[at + 3]) || any;
+  }
+  return any;
 }
 
 std::optional<Event> ImuIntake::objection(const ImuSample& sample) const {
@@ -74,10 +101,22 @@ std::optional<InertialSample> ImuIntake::accept(const ImuSample& sample,
                       "no IMU samples for " + std::to_string(interval_s) + " s, expected at most " +
                           std::to_string(max_gap_s) + " s: the motion in between is a guess"});
   }
+  const bool saturated = saturation_.add(sample.gyro_radps, sample.accel_mps2);
+  if (saturated && (saturation_told_ns_ == 0 ||
+                    to_seconds(sample.stamp_ns - saturation_told_ns_) > kSaturationEvery_s)) {
+    events.push_back({Severity::kWarning,
+                      sample.stamp_ns,
+                      "imu_saturated",
+                      "the IMU stands at the end of its range (" +
+                          std::to_string(sample.gyro_radps.cwiseAbs().maxCoeff()) + " rad/s, " +
+                          std::to_string(sample.accel_mps2.cwiseAbs().maxCoeff()) +
+                          " m/s^2): the motion beyond it is a guess"});
+    saturation_told_ns_ = sample.stamp_ns;
+  }
   newest_ns_ = sample.stamp_ns;
   ++accepted_;
   return InertialSample{
-      sample.stamp_ns, q_base_imu_ * sample.gyro_radps, q_base_imu_ * sample.accel_mps2};
+      sample.stamp_ns, q_base_imu_ * sample.gyro_radps, q_base_imu_ * sample.accel_mps2, saturated};
 }
 
 }  // namespace trigpoint::lio_mapper

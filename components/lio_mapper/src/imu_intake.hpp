@@ -9,6 +9,7 @@
 
 #include "propagation.hpp"
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -29,6 +30,25 @@ class Tally {
   std::vector<NamedCount> counts_;
 };
 
+/// Finds axes that stand at the end of their range: the largest magnitude ever seen, and the very
+/// same number several times in a row, which an axis with noise does not give.
+class SaturationCheck {
+ public:
+  bool add(const Eigen::Vector3d& gyro_radps, const Eigen::Vector3d& accel_mps2);
+
+ private:
+  struct Axis {
+    double last{0.0};
+    double largest{0.0};
+    int repeats{0};
+    int changes{0};
+  };
+
+  static bool add(double value, double least, Axis& axis);
+
+  std::array<Axis, 6> axes_;
+};
+
 /// Lets samples in that are finite, possible and newer than the last one, turned into base axes.
 /// Once the gyro is found to speak in degrees a second, none comes in any more.
 class ImuIntake {
@@ -44,6 +64,8 @@ class ImuIntake {
 
   Eigen::Quaterniond q_base_imu_;
   GyroUnitCheck gyro_unit_;
+  SaturationCheck saturation_;
+  Nanoseconds saturation_told_ns_{0};
   Nanoseconds newest_ns_{0};
   std::uint64_t received_{0};
   std::uint64_t accepted_{0};

@@ -2,6 +2,8 @@
 // Copyright the Trigpoint developers
 #include "imu_rate_odometry.hpp"
 
+#include <algorithm>
+
 namespace trigpoint::lio_mapper {
 
 using Eigen::Matrix3d;
@@ -60,10 +62,10 @@ void ImuRateOdometry::catch_up(const ImuBuffer& imu) {
   if (imu.empty() || imu.newest_ns() <= stamp_ns_) {
     return;
   }
-  const bool gap = imu.longest_gap_s(stamp_ns_, imu.newest_ns()) > imu_.max_gap_s;
+  const double gap_s = imu.longest_gap_s(stamp_ns_, imu.newest_ns());
   for (const InertialStep& step : imu.steps_between(stamp_ns_, imu.newest_ns(), kLongestStep_s)) {
     propagate_covariance(
-        step_jacobian(state_, step), imu_, gap ? imu_.gap_noise_factor : 1.0, covariance_);
+        step_jacobian(state_, step), imu_, noise_of(imu_, step, gap_s), covariance_);
     state_ = propagate(state_, step);
   }
   stamp_ns_ = imu.newest_ns();

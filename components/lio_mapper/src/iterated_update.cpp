@@ -10,16 +10,19 @@ namespace trigpoint::lio_mapper {
 
 namespace {
 
-using Gain = Eigen::Matrix<double, error::kSize, error::kPose>;
+template <int Size>
+using Gain = Eigen::Matrix<double, error::kSize, Size>;
 
 /// P_{:,6} (I + A P_66)^-1.
-Gain gain_of(const ErrorMatrix& covariance, const Matrix6d& information) {
-  const Matrix6d system =
-      Matrix6d::Identity() + information * covariance.topLeftCorner<error::kPose, error::kPose>();
+template <int Size>
+Gain<Size> gain_of(const ErrorMatrix& covariance,
+                   const Eigen::Matrix<double, Size, Size>& information) {
+  using Square = Eigen::Matrix<double, Size, Size>;
+  const Square system = Square::Identity() + information * covariance.topLeftCorner<Size, Size>();
   // X system = P_{:,6}  <=>  system^T X^T = P_{:,6}^T
   return system.transpose()
       .partialPivLu()
-      .solve(covariance.leftCols<error::kPose>().transpose())
+      .solve(covariance.leftCols<Size>().transpose())
       .transpose();
 }
 
@@ -47,28 +50,38 @@ std::array<double, 6> share_removed(const Vector6d& before, const Vector6d& afte
   return share;
 }
 
-}  // namespace
+UpdateResult unused(const State& prior, const ErrorMatrix& covariance) {
+  UpdateResult result;
+  result.state = prior;
+  result.covariance = covariance;
+  return result;
+}
 
-UpdateResult iterated_update(const State& prior,
-                             const ErrorMatrix& covariance,
-                             const std::function<PoseInformation(const Pose&)>& linearise,
-                             const IterationLimits& limits) {
+template <int Size, typename Linearise>
+UpdateResult iterate(const State& prior,
+                     const ErrorMatrix& covariance,
+                     const Linearise& linearise,
+                     const IterationLimits& limits) {
   UpdateResult result;
   result.state = prior;
   result.covariance = covariance;
   State state = prior;
   while (result.iterations < limits.max_iterations && !result.converged) {
-    const PoseInformation measured = linearise(state.T_odom_base);
+    const Information<Size> measured = linearise(state);
     if (measured.count < limits.min_count) {
-      return {.state = prior, .covariance = covariance};
+      return unused(prior, covariance);
     }
     const ErrorVector difference = boxminus(state, prior);
     const PriorJacobian jacobian = prior_jacobian(state, prior, difference);
     const ErrorVector back = to_tangent_of_state(jacobian, difference);
     const ErrorMatrix P = to_tangent_of_state(jacobian, covariance);
-    const Gain gain = gain_of(P, measured.information);
+    const Gain<Size> gain = gain_of<Size>(P, measured.information);
     const ErrorVector step =
-        -gain * (measured.gradient - measured.information * back.head<error::kPose>()) - back;
+        -gain * (measured.gradient - measured.information * back.template head<Size>()) - back;
+    result.measured = {measured.information.template topLeftCorner<error::kPose, error::kPose>(),
+                       measured.gradient.template head<error::kPose>(),
+                       measured.count};
+    result.measured_at = state.T_odom_base;
     state = boxplus(state, step);
     result.count = measured.count;
     result.converged = is_small(step, limits);
@@ -76,19 +89,42 @@ UpdateResult iterated_update(const State& prior,
     if (result.converged || result.iterations == limits.max_iterations) {
       const ErrorMatrix to_state =
           transition_to_tangent_of_state(jacobian, ErrorMatrix::Identity());
-      result.covariance = P - gain * measured.information * P.topRows<error::kPose>();
-      result.transition = to_state - gain * measured.information * to_state.topRows<error::kPose>();
+      result.covariance = P - gain * measured.information * P.template topRows<Size>();
+      result.transition =
+          to_state - gain * measured.information * to_state.template topRows<Size>();
     }
   }
   make_symmetric(result.covariance);
   result.used = state.is_finite() && result.covariance.allFinite();
   if (!result.used) {
-    return {.state = prior, .covariance = covariance};
+    return unused(prior, covariance);
   }
   result.state = state;
   result.observability =
       share_removed(axis_variances(covariance, prior), axis_variances(result.covariance, state));
   return result;
+}
+
+}  // namespace
+
+UpdateResult iterated_update(const State& prior,
+                             const ErrorMatrix& covariance,
+                             const std::function<PoseInformation(const Pose&)>& linearise,
+                             const IterationLimits& limits) {
+  return iterate<error::kPose>(
+      prior, covariance, [&](const State& state) { return linearise(state.T_odom_base); }, limits);
+}
+
+UpdateResult iterated_update_with_extrinsic(
+    const State& prior,
+    const ErrorMatrix& covariance,
+    const std::function<PoseAndExtrinsicInformation(const Pose&, const Pose&)>& linearise,
+    const IterationLimits& limits) {
+  return iterate<error::kPoseAndExtrinsic>(
+      prior,
+      covariance,
+      [&](const State& state) { return linearise(state.T_odom_base, state.T_base_lidar); },
+      limits);
 }
 
 }  // namespace trigpoint::lio_mapper

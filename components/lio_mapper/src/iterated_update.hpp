@@ -18,13 +18,20 @@ namespace trigpoint::lio_mapper {
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-/// What measurements of the pose say around one pose: the normal equations of their residuals r
-/// with Jacobian H over the error's first six columns.
-struct PoseInformation {
-  Matrix6d information{Matrix6d::Zero()};  ///< H^T R^-1 H
-  Vector6d gradient{Vector6d::Zero()};     ///< H^T R^-1 r
-  std::size_t count{0};                    ///< residuals in it
+/// What measurements say around one state: the normal equations of their residuals r with Jacobian
+/// H over the error's first `Size` columns.
+template <int Size>
+struct Information {
+  using Matrix = Eigen::Matrix<double, Size, Size>;
+  using Vector = Eigen::Matrix<double, Size, 1>;
+
+  Matrix information{Matrix::Zero()};  ///< H^T R^-1 H
+  Vector gradient{Vector::Zero()};     ///< H^T R^-1 r
+  std::size_t count{0};                ///< residuals in it
 };
+
+using PoseInformation = Information<error::kPose>;
+using PoseAndExtrinsicInformation = Information<error::kPoseAndExtrinsic>;
 
 struct IterationLimits {
   std::int64_t max_iterations{5};
@@ -45,15 +52,27 @@ struct UpdateResult {
   /// Share of the prior variance that was removed: x y z of odom, then roll pitch yaw about odom's
   /// axes.
   std::array<double, 6> observability{};
+  /// What the residuals alone said of the pose, at the last linearisation, and where that was.
+  PoseInformation measured;
+  Pose measured_at;
 };
 
 /// Iterates x <- x [+] (-K r - (I - K H) J^-1 (x [-] prior)), [1] eq. 18, with the gain in the form
 /// K = (H^T R^-1 H + P^-1)^-1 H^T R^-1 of [1] eq. 20, here as
 /// K R-weighted = P_{:,6} (I + A P_66)^-1 with A = H^T R^-1 H: the matrix inversion lemma on the
-/// six columns that H has, so that only a 6 x 6 system is solved and P is never inverted.
+/// six columns that H has (twelve with the extrinsic), so that only a system of that size is solved
+/// and P is never inverted.
 UpdateResult iterated_update(const State& prior,
                              const ErrorMatrix& covariance,
                              const std::function<PoseInformation(const Pose&)>& linearise,
                              const IterationLimits& limits);
+
+/// The same where residuals also see T_base_lidar.
+UpdateResult iterated_update_with_extrinsic(
+    const State& prior,
+    const ErrorMatrix& covariance,
+    const std::function<PoseAndExtrinsicInformation(const Pose& T_odom_base,
+                                                    const Pose& T_base_lidar)>& linearise,
+    const IterationLimits& limits);
 
 }  // namespace trigpoint::lio_mapper

@@ -45,14 +45,14 @@ PointCloud moved(const PointCloud& points, const Pose& T) {
 struct KeyframeReader::Impl {
   explicit Impl(const std::string& file) : database(opened(file)) {
     version = store::version_of(database);
-    if (version != store::kFormatVersion && version != store::kRawPointsVersion) {
+    if (version < store::kRawPointsVersion || version > store::kFormatVersion) {
       database.fail("has format version " + std::to_string(version) + ", this program reads " +
-                    std::to_string(store::kRawPointsVersion) + " and " +
+                    std::to_string(store::kRawPointsVersion) + " to " +
                     std::to_string(store::kFormatVersion));
     }
   }
 
-  bool has_all() const { return version == store::kFormatVersion; }
+  bool has_all() const { return version > store::kRawPointsVersion; }
 
   PointCloud points_of(const Statement& row, std::uint64_t id) const {
     if (!has_all()) {
@@ -160,7 +160,7 @@ struct KeyframeReader::Impl {
     s.copy(13, state.data(), sizeof state);
     store::set_state(state, c);
     copy_covariance(s, 14, c.covariance);
-    s.copy(15, c.drift_covariance.data(), sizeof(double) * 16);
+    s.copy(15, c.drift_covariance.data(), sizeof(double) * 36);
     const bool finite = std::all_of(
         state.begin(), state.end(), [](double number) { return std::isfinite(number); });
     if (!finite || !c.covariance.allFinite() || !c.drift_covariance.allFinite()) {
@@ -221,7 +221,7 @@ std::uint64_t KeyframeReader::visit_rows(const std::function<void(const StoredRo
 }
 
 std::optional<Checkpoint> KeyframeReader::checkpoint() {
-  if (!impl_->has_all()) {
+  if (impl_->version != store::kFormatVersion) {
     return std::nullopt;
   }
   Statement newest(impl_->database,

@@ -62,7 +62,7 @@ struct KeyframeWriter::Impl {
     if (version != store::kFormatVersion) {
       database.fail("has format version " + std::to_string(version) + ", this program writes " +
                     std::to_string(store::kFormatVersion) +
-                    (version == store::kRawPointsVersion
+                    (version >= store::kRawPointsVersion && version < store::kFormatVersion
                          ? "; it can be read, but a new session needs a new folder"
                          : ""));
     }
@@ -172,7 +172,7 @@ struct KeyframeWriter::Impl {
     s.bind_bytes(14, state.data(), sizeof state);
     s.bind_bytes(
         15, c.covariance.data(), sizeof(double) * static_cast<std::size_t>(c.covariance.size()));
-    s.bind_bytes(16, c.drift_covariance.data(), sizeof(double) * 16);
+    s.bind_bytes(16, c.drift_covariance.data(), sizeof(double) * 36);
     step(s);
   }
 

@@ -5,6 +5,7 @@
 #include "trigpoint/base/config.hpp"
 #include "trigpoint/base/so3.hpp"
 
+#include "calibration_report.hpp"
 #include "checkpoint_of.hpp"
 #include "downsample.hpp"
 #include "mapper_impl.hpp"
@@ -27,6 +28,9 @@ constexpr double kEarlySweep_s = 0.15;
 constexpr double kKeptBeforeStart_s = 5.0;
 /// A pose less certain than this relative to the local map is not a good one.
 constexpr double kDegradedSigma_m = 0.3;
+
+/// So long after the last usable scan it is said that there is none.
+constexpr double kBlind_s = 0.5;
 
 std::string seconds_text(Nanoseconds duration_ns) {
   return std::to_string(to_seconds(duration_ns)) + " s";
@@ -163,8 +167,10 @@ void LioMapper::Impl::process_front(Output& output) {
     refuse_front(*reason, "refused a sweep that the IMU does not cover", output);
     return;
   }
+  const bool doubtful = to_seconds(sweep.end_ns - last_used_ns) > config.matching.lost_after_s ||
+                        imu.longest_gap_s(filter->stamp_ns(), sweep.end_ns) > config.imu.lost_gap_s;
   const ScanOutcome outcome = filter->process(
-      sweep, imu, lost_track.search_for(*filter, T_base_lidar.p, sweep.end_ns, last_used_ns));
+      sweep, imu, lost_track.search_for(*filter, T_base_lidar.p, sweep.end_ns, doubtful));
   if (const auto event = lost_track.conclude(outcome, sweep.end_ns)) {
     output.events.push_back(*event);
     if (!lost_track.is_searching()) {
@@ -182,6 +188,7 @@ void LioMapper::Impl::process_front(Output& output) {
   update_map(outcome);
   begin_stage(Stage::kReport);
   judge_health(outcome, sweep.end_ns, output);
+  calibration_report.look(filter->calibration(), sweep.end_ns, output.events);
   report(outcome, output);
   sweeps.pop_front();
   imu.forget_before(filter->stamp_ns());
@@ -216,6 +223,23 @@ void LioMapper::Impl::judge_health(const ScanOutcome& outcome,
            " points matched (at least " + std::to_string(config.matching.min_matches) +
            " needed), " + seconds_text(stamp_ns - last_used_ns) + " since the last usable scan" +
            (good ? "" : "; going on with the IMU alone where the scan does not help")});
+}
+
+/// Without any scan to judge: the LiDAR is covered, dead, or its sweeps are refused.
+void LioMapper::Impl::judge_absence(Nanoseconds stamp_ns, Output& output) {
+  const double blind_s = to_seconds(stamp_ns - last_used_ns);
+  if (!filter || blind_s < kBlind_s || status.health == LioHealth::kLost) {
+    return;
+  }
+  const LioHealth before = status.health;
+  status.health = blind_s > config.matching.lost_after_s ? LioHealth::kLost : LioHealth::kDegraded;
+  if (status.health != before) {
+    output.events.push_back(
+        {Severity::kWarning,
+         stamp_ns,
+         status.health == LioHealth::kLost ? "lio_lost" : "lio_degraded",
+         "no usable scan for " + std::to_string(blind_s) + " s; going on with the IMU alone"});
+  }
 }
 
 void LioMapper::Impl::refresh_status() {
@@ -359,6 +383,7 @@ Output LioMapper::on_imu(const ImuSample& sample) {
         from_seconds(kKeptBeforeStart_s));
   }
   impl_->process_what_is_covered(output);
+  impl_->judge_absence(accepted->stamp_ns, output);
   output.odometry_imu_rate = impl_->imu_rate.advance(impl_->imu);
   return output;
 }
@@ -413,6 +438,15 @@ std::size_t LioMapper::map_memory_bytes() const {
 
 PointCloud LioMapper::local_map() const {
   return impl_->filter ? impl_->filter->map().points() : PointCloud{};
+}
+
+Calibration LioMapper::calibration() const {
+  if (impl_->filter) {
+    return impl_->filter->calibration();
+  }
+  Calibration configured;
+  configured.T_base_lidar = impl_->T_base_lidar;
+  return configured;
 }
 
 LioStatus LioMapper::status() const {

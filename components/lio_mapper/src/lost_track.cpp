@@ -37,9 +37,8 @@ double reach_rad(const ErrorMatrix& covariance) {
 PoseSearch LostTrack::search_for(ScanFilter& filter,
                                  const Eigen::Vector3d& lidar_position_base_m,
                                  Nanoseconds scan_ns,
-                                 Nanoseconds last_used_ns) {
-  const bool long_ago = to_seconds(scan_ns - last_used_ns) > matching_.lost_after_s;
-  if (!since_ns_ && (!long_ago || filter.map().empty())) {
+                                 bool doubtful) {
+  if (!since_ns_ && (!doubtful || filter.map().empty())) {
     return {};
   }
   return

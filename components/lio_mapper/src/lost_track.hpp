@@ -13,20 +13,20 @@
 
 namespace trigpoint::lio_mapper {
 
-/// After a while without a usable scan the IMU has carried the pose too far for matching, which
-/// finds wrong planes instead of none. Then a scan is looked for in the local map around the
-/// prediction, the farther the less that is certain.
+/// After a while without a usable scan, or over a gap in the IMU, the pose is carried too far for
+/// matching, which finds wrong planes instead of none. Then a scan is looked for in the local map
+/// around the prediction, the farther the less that is certain.
 class LostTrack {
  public:
   LostTrack(const MatchingConfig& matching, const RecoveryConfig& config)
       : matching_(matching), config_(config) {}
 
   /// What ScanFilter::process is to be given: empty while the scan can be matched as usual.
-  /// `filter` must live as long as it.
+  /// `doubtful`: the scan comes after either of those. `filter` must live as long as it.
   PoseSearch search_for(ScanFilter& filter,
                         const Eigen::Vector3d& lidar_position_base_m,
                         Nanoseconds scan_ns,
-                        Nanoseconds last_used_ns);
+                        bool doubtful);
 
   /// After a scan that was searched for. The event says where it was found, or that it was not.
   std::optional<Event> conclude(const ScanOutcome& outcome, Nanoseconds scan_ns);

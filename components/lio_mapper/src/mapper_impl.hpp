@@ -4,6 +4,7 @@
 
 #include "trigpoint/lio_mapper/lio_mapper.hpp"
 
+#include "calibration_report.hpp"
 #include "imu_buffer.hpp"
 #include "imu_intake.hpp"
 #include "imu_rate_odometry.hpp"
@@ -31,6 +32,7 @@ struct LioMapper::Impl {
         decoder(config.sweep),
         intake(robot.q_base_imu()),
         imu_rate(config.imu, config.imu_rate_odometry_hz),
+        calibration_report(config, T_base_lidar),
         keyframe_trigger(config.keyframes),
         lost_track(config.matching, config.recovery) {}
 
@@ -58,6 +60,7 @@ struct LioMapper::Impl {
   void align(const Alignment& alignment, Nanoseconds stamp_ns, Output& output);
   void count_row(const StateUpdate& update, const RowVerdict& verdict, Output& output);
   void judge_health(const ScanOutcome& outcome, Nanoseconds stamp_ns, Output& output);
+  void judge_absence(Nanoseconds stamp_ns, Output& output);
   void report(const ScanOutcome& outcome, Output& output);
   Keyframe make_keyframe(const ScanOutcome& outcome, const Odometry& odometry);
   void refresh_status();
@@ -70,6 +73,7 @@ struct LioMapper::Impl {
   std::deque<Sweep> sweeps;
   std::optional<ScanFilter> filter;
   ImuRateOdometry imu_rate;
+  CalibrationReport calibration_report;
   KeyframeTrigger keyframe_trigger;
   LostTrack lost_track;
   std::optional<Resumption> resumption;  ///< until the first start

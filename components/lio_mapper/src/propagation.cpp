@@ -13,6 +13,9 @@ using Eigen::Vector3d;
 
 namespace {
 
+/// Longer than this a robot or car keeps an acceleration or a turn rate.
+constexpr double kMotionBuildsUp_s = 0.5;
+
 /// The motion of one step: mean rate, and specific force at both ends without bias.
 struct Motion {
   double dt_s;
@@ -48,7 +51,8 @@ InertialSample interpolate(const InertialSample& a, const InertialSample& b, Nan
   const double fraction = to_seconds(stamp_ns - a.stamp_ns) / to_seconds(b.stamp_ns - a.stamp_ns);
   return {stamp_ns,
           a.gyro_radps + fraction * (b.gyro_radps - a.gyro_radps),
-          a.accel_mps2 + fraction * (b.accel_mps2 - a.accel_mps2)};
+          a.accel_mps2 + fraction * (b.accel_mps2 - a.accel_mps2),
+          a.saturated || b.saturated};
 }
 
 State propagate(const State& state, const InertialStep& step) {
@@ -89,28 +93,39 @@ void apply_transition(const StepJacobian& j, ErrorMatrix& matrix) {
   matrix.middleRows<3>(error::kRotation) = j.rotation * rotation + j.rotation_gyro_bias * gyro_bias;
 }
 
+StepNoise noise_of(const ImuConfig& config, const InertialStep& step, double gap_s) {
+  const auto square = [](double x) { return x * x; };
+  const double factor2 = square(step.noise_factor());
+  StepNoise noise{factor2 * square(config.gyro_noise_radps_sqrthz),
+                  factor2 * square(config.accel_noise_mps2_sqrthz)};
+  if (gap_s > config.max_gap_s) {
+    const double share2 = square(std::min(1.0, gap_s / kMotionBuildsUp_s));
+    noise.gyro2 += share2 * square(config.gap_gyro_radps) * gap_s;
+    noise.accel2 += share2 * square(config.gap_accel_mps2) * gap_s;
+  }
+  return noise;
+}
+
 void propagate_covariance(const StepJacobian& j,
-                          const ImuConfig& noise,
-                          double noise_factor,
+                          const ImuConfig& config,
+                          const StepNoise& noise,
                           ErrorMatrix& covariance) {
   apply_transition(j, covariance);
   covariance.transposeInPlace();
   apply_transition(j, covariance);
   const auto variance = [&](double density) { return density * density * j.dt_s; };
-  const double factor2 = noise_factor * noise_factor;
-  const double accel = factor2 * variance(noise.accel_noise_mps2_sqrthz);
+  const double accel = noise.accel2 * j.dt_s;
   // White specific force integrated once and twice over the step.
   for (int i = 0; i < 3; ++i) {
-    covariance(error::kRotation + i, error::kRotation + i) +=
-        factor2 * variance(noise.gyro_noise_radps_sqrthz);
+    covariance(error::kRotation + i, error::kRotation + i) += noise.gyro2 * j.dt_s;
     covariance(error::kVelocity + i, error::kVelocity + i) += accel;
     covariance(error::kPosition + i, error::kPosition + i) += accel * j.dt_s * j.dt_s / 3.0;
     covariance(error::kPosition + i, error::kVelocity + i) += accel * j.dt_s / 2.0;
     covariance(error::kVelocity + i, error::kPosition + i) += accel * j.dt_s / 2.0;
     covariance(error::kGyroBias + i, error::kGyroBias + i) +=
-        variance(noise.gyro_bias_walk_radps_sqrts);
+        variance(config.gyro_bias_walk_radps_sqrts);
     covariance(error::kAccelBias + i, error::kAccelBias + i) +=
-        variance(noise.accel_bias_walk_mps2_sqrts);
+        variance(config.accel_bias_walk_mps2_sqrts);
   }
 }
 

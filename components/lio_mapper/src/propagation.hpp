@@ -20,6 +20,7 @@ struct InertialSample {
   Nanoseconds stamp_ns{0};
   Eigen::Vector3d gyro_radps{Eigen::Vector3d::Zero()};
   Eigen::Vector3d accel_mps2{Eigen::Vector3d::Zero()};
+  bool saturated{false};  ///< an axis stands at the end of its range: the truth lies beyond
 };
 
 /// The sample between two others, linearly.
@@ -29,6 +30,9 @@ InertialSample interpolate(const InertialSample& a, const InertialSample& b, Nan
 struct InertialStep {
   InertialSample begin;
   InertialSample end;
+
+  /// Of noise densities; over a sweep it lets a saturated gyro be wrong by some tenths of a rad/s.
+  double noise_factor() const { return begin.saturated || end.saturated ? 100.0 : 1.0; }
 
   double duration_s() const { return to_seconds(end.stamp_ns - begin.stamp_ns); }
 };
@@ -52,10 +56,22 @@ StepJacobian step_jacobian(const State& state, const InertialStep& step);
 /// matrix <- F matrix, without forming F.
 void apply_transition(const StepJacobian& jacobian, ErrorMatrix& matrix);
 
-/// covariance <- F covariance F^T + Q. `noise_factor` scales the densities.
+/// Spectral densities of a step's white noise.
+struct StepNoise {
+  double gyro2{0.0};   ///< (rad/s)^2 / Hz
+  double accel2{0.0};  ///< (m/s^2)^2 / Hz
+};
+
+/// `gap_s` is the longest interval between samples around the step. Inside a gap the motion is a
+/// straight line between two samples, wrong by a motion that lasts: sigma over a gap T gives the
+/// velocity's variance (sigma T)^2, hence the density sigma^2 T. Motions take time to build up, so
+/// that sigma grows with T.
+StepNoise noise_of(const ImuConfig& config, const InertialStep& step, double gap_s);
+
+/// covariance <- F covariance F^T + Q.
 void propagate_covariance(const StepJacobian& jacobian,
-                          const ImuConfig& noise,
-                          double noise_factor,
+                          const ImuConfig& config,
+                          const StepNoise& noise,
                           ErrorMatrix& covariance);
 
 /// A pose on the way and what is needed to go on from it to the next one.

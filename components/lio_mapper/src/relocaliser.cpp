@@ -188,7 +188,8 @@ std::optional<Pose> refined(const Hypothesis& h,
   covariance.block<3, 3>(error::kPosition, error::kPosition) =
       position2 * Eigen::Matrix3d::Identity();
   covariance.block<3, 3>(error::kRotation, error::kRotation) = R.transpose() * turn * R;
-  ScanMatcher matcher(points_base, map, scan.lidar_position_base_m, matching, workers);
+  const Pose T_base_lidar{Eigen::Quaterniond::Identity(), scan.lidar_position_base_m};
+  ScanMatcher matcher(points_base, map, T_base_lidar, matching, workers);  // axes play no part
   const UpdateResult result = iterated_update(prior,
                                               covariance,
                                               [&](const Pose& T) { return matcher.linearise(T); },

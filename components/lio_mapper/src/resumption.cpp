@@ -167,7 +167,7 @@ Resumption::Found Resumption::compose(const StartResult& start,
   let_biases_walk(config_.imu, std::max(0.0, away_s), P);
   const double moved_m = (state.T_odom_base.p - checkpoint_.T_odom_base.p).norm();
   if (!options_.frozen_map) {
-    add_drift_noise(config_.drift, moved_m, state, checkpoint_.aligned, P);
+    add_drift_noise(drift_rate(config_.drift), moved_m, state, checkpoint_.aligned, P);
   }
   make_symmetric(P);
   found.past.aligned = checkpoint_.aligned;

@@ -7,8 +7,11 @@
 #include "downsample.hpp"
 #include "scan_matcher.hpp"
 #include "undistortion.hpp"
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
+#include <algorithm>
 #include <utility>
 
 namespace trigpoint::lio_mapper {
@@ -29,6 +32,24 @@ constexpr double kFoundRotation_rad = 0.01;
 /// A scan is put into the map unmatched only while its pose relative to the map is this certain.
 constexpr double kMapSigma_m = 0.3;
 
+InitialState with_extrinsic(InitialState initial,
+                            const Pose& T_base_lidar,
+                            const ExtrinsicConfig& config) {
+  initial.state.T_base_lidar = T_base_lidar;
+  auto& P = initial.covariance;
+  P.middleRows<6>(error::kExtrinsicRotation).setZero();
+  P.middleCols<6>(error::kExtrinsicRotation).setZero();
+  if (config.estimate) {
+    P.diagonal()
+        .segment<3>(error::kExtrinsicRotation)
+        .setConstant(config.rotation_sigma_rad * config.rotation_sigma_rad);
+    P.diagonal()
+        .segment<3>(error::kExtrinsicPosition)
+        .setConstant(config.position_sigma_m * config.position_sigma_m);
+  }
+  return initial;
+}
+
 IterationLimits limits_of(const MatchingConfig& config) {
   return {config.max_iterations,
           config.converged_position_m,
@@ -36,12 +57,32 @@ IterationLimits limits_of(const MatchingConfig& config) {
           static_cast<std::size_t>(config.min_matches)};
 }
 
-/// Jacobian of the pose error of T * pose (position, heading) by the error of T = (yaw, x, y, z).
-Eigen::Matrix<double, 6, 4> pose_by_transform(double yaw_rad, const Vector3d& p_odom_m) {
-  Eigen::Matrix<double, 6, 4> jacobian = Eigen::Matrix<double, 6, 4>::Zero();
-  jacobian.topLeftCorner<3, 1>() = Vector3d::UnitZ().cross(from_yaw(yaw_rad) * p_odom_m);
-  jacobian.topRightCorner<3, 3>().setIdentity();
-  jacobian(5, 0) = 1.0;
+/// Attitudes of scans less certain than this say nothing about clocks.
+constexpr double kAttitudeSigma_rad = 2e-3;
+
+/// The attitude that the residuals alone ask for, whatever the prior; nullopt where they leave a
+/// direction open.
+std::optional<Eigen::Quaterniond> attitude_of_scan(const UpdateResult& result) {
+  const Matrix6d& A = result.measured.information;
+  const Vector6d& g = result.measured.gradient;
+  // Along directions in which position is open too, it is left where it is.
+  const Matrix3d A_pp =
+      A.topLeftCorner<3, 3>() + 1e-9 * A.topLeftCorner<3, 3>().trace() * Matrix3d::Identity();
+  const Matrix3d by_position = A_pp.ldlt().solve(A.topRightCorner<3, 3>()).transpose();
+  const Matrix3d S = A.bottomRightCorner<3, 3>() - by_position * A.topRightCorner<3, 3>();
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(S);
+  if (!(eigen.eigenvalues()[0] > 1.0 / (kAttitudeSigma_rad * kAttitudeSigma_rad))) {
+    return std::nullopt;
+  }
+  const Vector3d turn_rad = -S.ldlt().solve(g.tail<3>() - by_position * g.head<3>());
+  return (result.measured_at.q * so3_exp(turn_rad)).normalized();
+}
+
+/// By how much a pose at `p` moves with a displacement of odom that is expressed about its origin,
+/// ROS order; -p is the way back.
+Matrix6d transport(const Vector3d& p_odom_m) {
+  Matrix6d jacobian = Matrix6d::Identity();
+  jacobian.topRightCorner<3, 3>() = -hat(p_odom_m);
   return jacobian;
 }
 
@@ -59,20 +100,31 @@ PointCloud transformed(const PointCloud& points, const Pose& T) {
   return moved;
 }
 
-Matrix4d drift_noise(const DriftConfig& drift,
+DriftRate drift_rate(const DriftConfig& drift, const Matrix6d& local) {
+  const double inherited = drift.map_renewal_per_m;
+  const auto square = [](double x) { return x * x; };
+  DriftRate rate;
+  rate.position_m2 = square(drift.position_sigma_m_sqrtm) * Matrix3d::Identity() +
+                     inherited * local.topLeftCorner<3, 3>();
+  rate.tilt_rad2 = square(drift.tilt_sigma_rad_sqrtm) * Eigen::Matrix2d::Identity() +
+                   inherited * local.block<2, 2>(3, 3);
+  rate.yaw_rad2 = square(drift.yaw_sigma_rad_sqrtm) + inherited * local(5, 5);
+  return rate;
+}
+
+Matrix4d drift_noise(const DriftRate& rate,
                      double distance_m,
                      const Matrix3d& R_frame_odom,
                      const Vector3d& p_odom_m) {
-  const double position2 = drift.position_sigma_m_sqrtm * drift.position_sigma_m_sqrtm * distance_m;
-  const double yaw2 = drift.yaw_sigma_rad_sqrtm * drift.yaw_sigma_rad_sqrtm * distance_m;
   Eigen::Vector4d turn = Eigen::Vector4d::UnitX();
   turn.tail<3>() = -Vector3d::UnitZ().cross(R_frame_odom * p_odom_m);
-  Matrix4d noise = yaw2 * turn * turn.transpose();
-  noise.bottomRightCorner<3, 3>().diagonal().array() += position2;
+  Matrix4d noise = rate.yaw_rad2 * distance_m * turn * turn.transpose();
+  noise.bottomRightCorner<3, 3>() +=
+      distance_m * R_frame_odom * rate.position_m2 * R_frame_odom.transpose();
   return noise;
 }
 
-void add_drift_noise(const DriftConfig& drift,
+void add_drift_noise(const DriftRate& rate,
                      double distance_m,
                      const State& state,
                      bool aligned,
@@ -83,10 +135,10 @@ void add_drift_noise(const DriftConfig& drift,
     const Vector3d& p_odom_m = state.T_odom_base.p;
     tilt.middleRows<3>(error::kPositionMapOdom) = -placed_point_by_gravity(state, p_odom_m);
     covariance.block<4, 4>(error::kYawMapOdom, error::kYawMapOdom) +=
-        drift_noise(drift, distance_m, state.placement().pose().q.toRotationMatrix(), p_odom_m);
+        drift_noise(rate, distance_m, state.placement().pose().q.toRotationMatrix(), p_odom_m);
   }
-  const double tilt2 = drift.tilt_sigma_rad_sqrtm * drift.tilt_sigma_rad_sqrtm * distance_m;
-  covariance += tilt2 * tilt * tilt.transpose();
+  // The gravity errors turn about odom's x and y as long as odom is nearly level.
+  covariance += distance_m * tilt * rate.tilt_rad2 * tilt.transpose();
 }
 
 ScanFilter::ScanFilter(const Config& config,
@@ -95,7 +147,7 @@ ScanFilter::ScanFilter(const Config& config,
                        StageObserver observe)
     : config_(config),
       T_base_lidar_(T_base_lidar),
-      initial_(initial),
+      initial_(with_extrinsic(initial, T_base_lidar, config.extrinsic)),
       observe_(std::move(observe)),
       workers_(std::make_unique<Workers>(static_cast<std::size_t>(config.matching.threads))),
       map_(make_local_map(config.local_map)),
@@ -116,8 +168,7 @@ const ErrorMatrix& ScanFilter::covariance() const {
 ScanFilter::Prediction ScanFilter::predict(const Sweep& sweep, const ImuBuffer& imu) const {
   Prediction prediction{state(), covariance()};
   const auto steps = imu.steps_between(stamp_ns(), sweep.end_ns, kLongestStep_s);
-  const bool gap = imu.longest_gap_s(stamp_ns(), sweep.end_ns) > config_.imu.max_gap_s;
-  const double noise_factor = gap ? config_.imu.gap_noise_factor : 1.0;
+  const double gap_s = imu.longest_gap_s(stamp_ns(), sweep.end_ns);
   PathNode node{stamp_ns(), state().T_odom_base, state().v_odom_mps};
   for (const InertialStep& step : steps) {
     const StepJacobian jacobian = step_jacobian(prediction.state, step);
@@ -127,7 +178,8 @@ ScanFilter::Prediction ScanFilter::predict(const Sweep& sweep, const ImuBuffer& 
     node.angular_radps =
         0.5 * (step.begin.gyro_radps + step.end.gyro_radps) - prediction.state.gyro_bias_radps;
     prediction.path.push_back(node);
-    propagate_covariance(jacobian, config_.imu, noise_factor, prediction.covariance);
+    propagate_covariance(
+        jacobian, config_.imu, noise_of(config_.imu, step, gap_s), prediction.covariance);
     apply_transition(jacobian, prediction.transition);
     prediction.state = next;
     node.stamp_ns = step.end.stamp_ns;
@@ -144,25 +196,48 @@ void ScanFilter::add_drift(Prediction& prediction) {
     return;
   }
   distance_m_ += moved_m;
-  const Vector3d& p = prediction.state.T_odom_base.p;
-  drift_covariance_ += drift_noise(config_.drift, moved_m, Matrix3d::Identity(), p);
-  add_drift_noise(config_.drift, moved_m, prediction.state, aligned_, prediction.covariance);
+  const DriftRate rate = drift_rate(config_.drift, pose_covariance_in_local_map());
+  Matrix6d at_robot = Matrix6d::Zero();
+  at_robot.topLeftCorner<3, 3>() = moved_m * rate.position_m2;
+  at_robot.block<2, 2>(3, 3) = moved_m * rate.tilt_rad2;
+  at_robot(5, 5) = moved_m * rate.yaw_rad2;
+  const Matrix6d to_origin = transport(-prediction.state.T_odom_base.p);
+  drift_covariance_ += to_origin * at_robot * to_origin.transpose();
+  add_drift_noise(rate, moved_m, prediction.state, aligned_, prediction.covariance);
+}
+
+UpdateResult ScanFilter::update(const Prediction& prediction, ScanMatcher& matcher) {
+  const IterationLimits limits = limits_of(config_.matching);
+  const auto timed = [&](const auto& linearise) {
+    begin(Stage::kMatch);
+    auto information = linearise();
+    begin(Stage::kSolve);
+    return information;
+  };
+  if (!config_.extrinsic.estimate) {
+    return iterated_update(
+        prediction.state,
+        prediction.covariance,
+        [&](const Pose& T_odom_base) {
+          return timed([&] { return matcher.linearise(T_odom_base); });
+        },
+        limits);
+  }
+  return iterated_update_with_extrinsic(
+      prediction.state,
+      prediction.covariance,
+      [&](const Pose& T_odom_base, const Pose& T_base_lidar) {
+        return timed([&] { return matcher.linearise(T_odom_base, T_base_lidar, origins_); });
+      },
+      limits);
 }
 
 UpdateResult ScanFilter::match(const Prediction& prediction,
                                const PointCloud& thinned_base,
                                ScanOutcome& outcome) {
-  ScanMatcher matcher(thinned_base, *map_, T_base_lidar_.p, config_.matching, *workers_);
-  UpdateResult result = iterated_update(
-      prediction.state,
-      prediction.covariance,
-      [&](const Pose& T_odom_base) {
-        begin(Stage::kMatch);
-        const PoseInformation information = matcher.linearise(T_odom_base);
-        begin(Stage::kSolve);
-        return information;
-      },
-      limits_of(config_.matching));
+  ScanMatcher matcher(
+      thinned_base, *map_, prediction.state.T_base_lidar, config_.matching, *workers_);
+  UpdateResult result = update(prediction, matcher);
   outcome.used = result.used;
   outcome.matches = result.count;
   outcome.iterations = result.iterations;
@@ -218,6 +293,18 @@ bool ScanFilter::search(const PoseSearch& look,
   return result.used;
 }
 
+void ScanFilter::compare_clocks(const UpdateResult& result,
+                                Nanoseconds stamp_ns,
+                                const ImuBuffer& imu) {
+  const auto attitude = result.used ? attitude_of_scan(result) : std::nullopt;
+  const bool gap = imu.longest_gap_s(this->stamp_ns(), stamp_ns) > config_.imu.max_gap_s;
+  if (attitude && !gap) {
+    clock_offset_.add(stamp_ns, *attitude, result.state.gyro_bias_radps, imu);
+  } else {
+    clock_offset_.interrupt();
+  }
+}
+
 ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu, const PoseSearch& look) {
   begin(Stage::kPredict);
   Prediction prediction = predict(sweep, imu);
@@ -225,7 +312,7 @@ ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu, const 
 
   ScanOutcome outcome;
   begin(Stage::kUndistort);
-  outcome.points_base = undistort(sweep, prediction.path, T_base_lidar_);
+  outcome.points_base = undistort(sweep, prediction.path, prediction.state.T_base_lidar);
   begin(Stage::kDownsample);
   outcome.thinned_base = downsample(outcome.points_base, config_.matching.voxel_m);
   outcome.points = outcome.thinned_base.size();
@@ -242,9 +329,15 @@ ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu, const 
     outcome.used = outcome.points >= static_cast<std::size_t>(config_.matching.min_matches);
   } else if (match_it) {
     const UpdateResult result = match(prediction, outcome.thinned_base, outcome);
+    compare_clocks(result, sweep.end_ns, imu);
     record.before_rows = result.state;
     record.covariance_before_rows = result.covariance;
     record.transition = result.transition * prediction.transition;
+    if (config_.extrinsic.estimate) {
+      const Pose T_base_base = result.state.T_base_lidar * prediction.state.T_base_lidar.inverse();
+      outcome.points_base = transformed(outcome.points_base, T_base_base);
+      outcome.thinned_base = transformed(outcome.thinned_base, T_base_base);
+    }
   }
   record.path = std::move(prediction.path);
   history_.push(std::move(record));
@@ -256,12 +349,34 @@ void ScanFilter::insert(const ScanOutcome& outcome) {
   const Vector3d& p = state().T_odom_base.p;
   const double sigma2 = covariance().diagonal().head<3>().maxCoeff();
   if (outcome.used || sigma2 < kMapSigma_m * kMapSigma_m) {
-    map_->insert(transformed(outcome.thinned_base, state().T_odom_base));
+    const PointCloud points_odom = transformed(outcome.thinned_base, state().T_odom_base);
+    map_->insert(points_odom);
+    if (config_.extrinsic.estimate) {
+      origins_.insert(points_odom, state().T_odom_base, state().T_base_lidar);
+    }
   }
   if ((p - pruned_at_m_).norm() > config_.local_map.prune_every_m) {
     map_->prune(p, config_.local_map.half_side_m);
+    origins_.prune(p, config_.local_map.half_side_m);
     pruned_at_m_ = p;
   }
+}
+
+Calibration ScanFilter::calibration() const {
+  Calibration calibration;
+  calibration.T_base_lidar = state().T_base_lidar;
+  // The filter has the rotation first.
+  Eigen::Matrix<double, 6, 6> swap = Eigen::Matrix<double, 6, 6>::Zero();
+  swap.topRightCorner<3, 3>().setIdentity();
+  swap.bottomLeftCorner<3, 3>().setIdentity();
+  calibration.extrinsic_covariance =
+      swap * covariance().block<6, 6>(error::kExtrinsicRotation, error::kExtrinsicRotation) *
+      swap.transpose();
+  if (const auto clock = clock_offset_.estimate()) {
+    calibration.clock_offset_s = clock->offset_s;
+    calibration.clock_offset_sigma_s = clock->sigma_s;
+  }
+  return calibration;
 }
 
 void ScanFilter::align(const Alignment& alignment) {
@@ -290,7 +405,7 @@ Matrix6d ScanFilter::placement_covariance() const {
 }
 
 Matrix6d ScanFilter::pose_covariance() const {
-  const auto jacobian = pose_by_transform(0.0, state().T_odom_base.p);
+  const Matrix6d jacobian = transport(state().T_odom_base.p);
   return pose_covariance_in_local_map() + jacobian * drift_covariance_ * jacobian.transpose();
 }
 

@@ -4,11 +4,14 @@
 
 #include "trigpoint/base/measurements.hpp"
 #include "trigpoint/lio_mapper/config.hpp"
+#include "trigpoint/lio_mapper/lio_mapper.hpp"
 #include "trigpoint/lio_mapper/stages.hpp"
 
+#include "clock_offset.hpp"
 #include "imu_buffer.hpp"
 #include "iterated_update.hpp"
 #include "local_map.hpp"
+#include "map_origins.hpp"
 #include "row_history.hpp"
 #include "sweep.hpp"
 #include "workers.hpp"
@@ -21,7 +24,9 @@
 
 namespace trigpoint::lio_mapper {
 
-/// Where the filter begins.
+class ScanMatcher;
+
+/// Where the filter begins; T_base_lidar is the filter's own matter.
 struct InitialState {
   Nanoseconds stamp_ns{0};
   State state;
@@ -37,7 +42,7 @@ struct ScanOutcome {
   int iterations{0};
   double share_within_10_cm{0.0};  ///< of the thinned points, from their planes
   std::array<double, 6> observability{};
-  PointCloud points_base;   ///< undistorted, all
+  PointCloud points_base;   ///< undistorted, all; with the extrinsic that this scan ended with
   PointCloud thinned_base;  ///< undistorted, one a voxel
 };
 
@@ -45,7 +50,7 @@ struct ScanOutcome {
 struct Past {
   bool aligned{false};
   double distance_m{0.0};
-  Eigen::Matrix4d drift_covariance{Eigen::Matrix4d::Zero()};
+  Matrix6d drift_covariance{Matrix6d::Zero()};  ///< of odom, about its origin, ROS order
   std::unique_ptr<LocalMap> map;
 };
 
@@ -80,6 +85,8 @@ class ScanFilter {
   const State& state() const;
   const ErrorMatrix& covariance() const;
 
+  Calibration calibration() const;
+
   bool aligned() const { return aligned_; }
 
   double distance_m() const { return distance_m_; }
@@ -91,7 +98,7 @@ class ScanFilter {
 
   Workers& workers() { return *workers_; }
 
-  const Eigen::Matrix4d& drift_covariance() const { return drift_covariance_; }
+  const Matrix6d& drift_covariance() const { return drift_covariance_; }
 
   void align(const Alignment& alignment);
   RowVerdict apply(const StateUpdate& update);
@@ -130,6 +137,8 @@ class ScanFilter {
   UpdateResult match(const Prediction& prediction,
                      const PointCloud& thinned_base,
                      ScanOutcome& outcome);
+  void compare_clocks(const UpdateResult& result, Nanoseconds stamp_ns, const ImuBuffer& imu);
+  UpdateResult update(const Prediction& prediction, ScanMatcher& matcher);
 
   Config config_;
   Pose T_base_lidar_;
@@ -137,26 +146,41 @@ class ScanFilter {
   StageObserver observe_;
   std::unique_ptr<Workers> workers_;
   std::unique_ptr<LocalMap> map_;
+  MapOrigins origins_;  ///< empty unless the extrinsic is estimated
+  ClockOffsetEstimator clock_offset_;
   RowHistory history_;
   bool aligned_{false};
   double distance_m_{0.0};
   Eigen::Vector3d pruned_at_m_{Eigen::Vector3d::Zero()};
-  Eigen::Matrix4d drift_covariance_{Eigen::Matrix4d::Zero()};  ///< of odom: yaw, x, y, z
+  Matrix6d drift_covariance_{Matrix6d::Zero()};  ///< of odom, about its origin, ROS order
 };
 
 PointCloud transformed(const PointCloud& points, const Pose& T);
 
-/// Covariance that a random walk of heading and position at `p_odom_m` adds to a transform
+/// Variances that odom's drift gathers over a metre, axes of odom.
+struct DriftRate {
+  Eigen::Matrix3d position_m2{Eigen::Matrix3d::Zero()};
+  Eigen::Matrix2d tilt_rad2{Eigen::Matrix2d::Zero()};
+  double yaw_rad2{0.0};
+};
+
+/// The configured walk, and what the map inherits: new map is laid with the error that the pose has
+/// relative to the old map, so over the length on which the map is renewed its covariance (ROS
+/// order) is passed on once.
+DriftRate drift_rate(const DriftConfig& drift,
+                     const Matrix6d& pose_covariance_in_local_map = Matrix6d::Zero());
+
+/// Covariance that the drift of heading and position at `p_odom_m` adds to a transform
 /// (yaw, x, y, z) from odom into a frame turned by `R_frame_odom`: the heading turns about the
 /// robot, not about the origin of odom.
-Eigen::Matrix4d drift_noise(const DriftConfig& drift,
+Eigen::Matrix4d drift_noise(const DriftRate& rate,
                             double distance_m,
                             const Eigen::Matrix3d& R_frame_odom,
                             const Eigen::Vector3d& p_odom_m);
 
 /// Adds to `covariance` what odom may drift against map over `distance_m`: the noise above and a
 /// tilt, which likewise turns odom about the robot. Before the alignment only the tilt.
-void add_drift_noise(const DriftConfig& drift,
+void add_drift_noise(const DriftRate& rate,
                      double distance_m,
                      const State& state,
                      bool aligned,

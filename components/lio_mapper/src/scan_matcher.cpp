@@ -29,12 +29,12 @@ std::size_t blocks_of(std::size_t count) {
 
 ScanMatcher::ScanMatcher(const PointCloud& points_base,
                          const LocalMap& map,
-                         const Vector3d& lidar_position_base_m,
+                         const Pose& T_base_lidar,
                          const MatchingConfig& config,
                          Workers& workers)
     : points_base_(points_base),
       map_(map),
-      lidar_position_base_m_(lidar_position_base_m),
+      T_base_lidar_(T_base_lidar),
       config_(config),
       workers_(workers),
       slots_(points_base.size()),
@@ -56,13 +56,14 @@ bool ScanMatcher::match_point(const PointXyzi& point,
   if (!map_.match(point_odom_m, r.plane)) {
     return false;
   }
-  const Vector3d beam_m = r.point_base_m - lidar_position_base_m_;
+  const Vector3d beam_m = r.point_base_m - T_base_lidar_.p;
   r.range_m = beam_m.norm();
   r.residual_m = r.plane.normal.dot(point_odom_m) + r.plane.offset_m;
   if (r.range_m < 1e-3 || std::abs(r.residual_m) > kGatePerRootRange * std::sqrt(r.range_m)) {
     return false;
   }
   r.direction_base = beam_m / r.range_m;
+  r.origin = nullptr;
   return true;
 }
 
@@ -92,37 +93,72 @@ double ScanMatcher::variance_m2(const Residual& r, double cos_incidence) const {
          r.plane.thickness2_m2;
 }
 
-PoseInformation ScanMatcher::sum_of(std::size_t block, const Pose& T_odom_base) {
-  const Eigen::Matrix3d R = T_odom_base.q.toRotationMatrix();
-  PoseInformation sum;
-  const std::size_t end = std::min((block + 1) * kBlock, residuals_.size());
-  for (std::size_t i = block * kBlock; i < end; ++i) {
-    Residual& r = residuals_[i];
-    const Vector3d normal_base = R.transpose() * r.plane.normal;
-    r.residual_m =
-        normal_base.dot(r.point_base_m) + r.plane.normal.dot(T_odom_base.p) + r.plane.offset_m;
-    const double variance = variance_m2(r, normal_base.dot(r.direction_base));
-    const double ratio = std::abs(r.residual_m) / (config_.robust_width * std::sqrt(variance));
-    const double weight = (ratio > 1.0 ? 1.0 / ratio : 1.0) / variance;
-    // d(n . R exp(e) p) / de = (p x R^T n)^T
-    Vector6d h;
-    h << r.plane.normal, r.point_base_m.cross(normal_base);
-    sum.information.selfadjointView<Eigen::Lower>().rankUpdate(h, weight);
-    sum.gradient += weight * r.residual_m * h;
+double ScanMatcher::weight_of(const Residual& r, double cos_incidence) const {
+  const double variance = variance_m2(r, cos_incidence);
+  const double ratio = std::abs(r.residual_m) / (config_.robust_width * std::sqrt(variance));
+  return (ratio > 1.0 ? 1.0 / ratio : 1.0) / variance;
+}
+
+void ScanMatcher::add(Residual& r, const Viewpoint& view, PoseInformation& sum) const {
+  const Vector3d normal_base = view.R_odom_base.transpose() * r.plane.normal;
+  r.residual_m =
+      normal_base.dot(r.point_base_m) + r.plane.normal.dot(view.T_odom_base.p) + r.plane.offset_m;
+  const double weight = weight_of(r, normal_base.dot(r.direction_base));
+  // d(n . R exp(e) p) / de = (p x R^T n)^T
+  Vector6d h;
+  h << r.plane.normal, r.point_base_m.cross(normal_base);
+  sum.information.selfadjointView<Eigen::Lower>().rankUpdate(h, weight);
+  sum.gradient += weight * r.residual_m * h;
+}
+
+void ScanMatcher::add(Residual& r, const Viewpoint& view, PoseAndExtrinsicInformation& sum) const {
+  const Vector3d point_base_m = view.T_base_base * r.point_base_m;
+  const Vector3d point_odom_m = view.R_odom_base * point_base_m + view.T_odom_base.p;
+  Vector3d normal = r.plane.normal;
+  // The point of the plane below the measured one.
+  Vector3d foot_odom_m = point_odom_m - (normal.dot(point_odom_m) + r.plane.offset_m) * normal;
+  PoseAndExtrinsicInformation::Vector h = PoseAndExtrinsicInformation::Vector::Zero();
+  if (r.origin != nullptr) {
+    // Seen again from where it was made, through the present extrinsic.
+    const Pose& T_odom_then = r.origin->T_odom_base;
+    const Pose T_odom_lidar_then = T_odom_then * r.origin->T_base_lidar;
+    const Pose T_odom_lidar = T_odom_then * view.T_base_lidar;
+    const Vector3d foot_lidar_m = T_odom_lidar_then.inverse() * foot_odom_m;
+    normal = T_odom_lidar.q * (T_odom_lidar_then.q.conjugate() * normal);
+    foot_odom_m = T_odom_lidar * foot_lidar_m;
+    const Vector3d normal_base = view.R_odom_base.transpose() * normal;
+    const Vector3d point_lidar_m = T_base_lidar_.inverse() * r.point_base_m;
+    const Vector3d normal_lidar = T_odom_lidar.q.conjugate() * normal;
+    // The last term: the plane turns.
+    h.segment<3>(error::kExtrinsicRotation) =
+        point_lidar_m.cross(view.T_base_lidar.q.conjugate() * normal_base) -
+        foot_lidar_m.cross(normal_lidar) +
+        normal_lidar.cross(T_odom_lidar.q.conjugate() * (point_odom_m - foot_odom_m));
+    h.segment<3>(error::kExtrinsicPosition) = normal_base - T_odom_then.q.conjugate() * normal;
   }
-  return sum;
+  const Vector3d normal_base = view.R_odom_base.transpose() * normal;
+  r.residual_m = normal.dot(point_odom_m - foot_odom_m);
+  const double weight = weight_of(r, normal_base.dot(r.direction_base));
+  h.segment<3>(error::kPosition) = normal;
+  h.segment<3>(error::kRotation) = point_base_m.cross(normal_base);
+  sum.information.selfadjointView<Eigen::Lower>().rankUpdate(h, weight);
+  sum.gradient += weight * r.residual_m * h;
 }
 
 /// Block by block and the blocks in order, so that the sum has the same rounding on any number of
 /// threads.
-PoseInformation ScanMatcher::linearise(const Pose& T_odom_base) {
-  if (must_match_again(T_odom_base)) {
-    match(T_odom_base);
-  }
-  sums_.resize(blocks_of(residuals_.size()));
-  workers_.run(sums_.size(), [&](std::size_t block) { sums_[block] = sum_of(block, T_odom_base); });
-  PoseInformation sum;
-  for (const PoseInformation& part : sums_) {
+template <int Size>
+Information<Size> ScanMatcher::sum_of_all(const Viewpoint& view,
+                                          std::vector<Information<Size>>& sums) {
+  sums.assign(blocks_of(residuals_.size()), {});
+  workers_.run(sums.size(), [&](std::size_t block) {
+    const std::size_t end = std::min((block + 1) * kBlock, residuals_.size());
+    for (std::size_t i = block * kBlock; i < end; ++i) {
+      add(residuals_[i], view, sums[block]);
+    }
+  });
+  Information<Size> sum;
+  for (const Information<Size>& part : sums) {
     sum.information += part.information;
     sum.gradient += part.gradient;
   }
@@ -131,9 +167,35 @@ PoseInformation ScanMatcher::linearise(const Pose& T_odom_base) {
       std::min(1.0,
                config_.independent_residuals /
                    static_cast<double>(std::max<std::size_t>(residuals_.size(), 1)));
-  sum.information = scale * Matrix6d(sum.information.selfadjointView<Eigen::Lower>());
+  sum.information = (scale * typename Information<Size>::Matrix(
+                                 sum.information.template selfadjointView<Eigen::Lower>()))
+                        .eval();
   sum.gradient *= scale;
   return sum;
+}
+
+PoseInformation ScanMatcher::linearise(const Pose& T_odom_base) {
+  if (must_match_again(T_odom_base)) {
+    match(T_odom_base);
+  }
+  return sum_of_all(Viewpoint{T_odom_base, T_odom_base.q.toRotationMatrix(), T_base_lidar_, Pose{}},
+                    sums_);
+}
+
+PoseAndExtrinsicInformation ScanMatcher::linearise(const Pose& T_odom_base,
+                                                   const Pose& T_base_lidar,
+                                                   const MapOrigins& origins) {
+  if (must_match_again(T_odom_base)) {
+    match(T_odom_base);
+    for (Residual& r : residuals_) {
+      r.origin = origins.find(T_odom_base * r.point_base_m);
+    }
+  }
+  return sum_of_all(Viewpoint{T_odom_base,
+                              T_odom_base.q.toRotationMatrix(),
+                              T_base_lidar,
+                              T_base_lidar * T_base_lidar_.inverse()},
+                    sums_with_extrinsic_);
 }
 
 double ScanMatcher::share_within(double distance_m) const {

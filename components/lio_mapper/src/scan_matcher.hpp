@@ -7,6 +7,7 @@
 
 #include "iterated_update.hpp"
 #include "local_map.hpp"
+#include "map_origins.hpp"
 #include "workers.hpp"
 #include <Eigen/Core>
 
@@ -20,17 +21,24 @@ namespace trigpoint::lio_mapper {
 /// eq. 12. Sums the normal equations directly while it goes through the points.
 class ScanMatcher {
  public:
-  /// All are referred to, not copied; points in base axes. The result does not depend on the number
-  /// of workers.
+  /// All but the pose are referred to, not copied; points in base axes, brought there with
+  /// `T_base_lidar`. The result does not depend on the number of workers.
   ScanMatcher(const PointCloud& points_base,
               const LocalMap& map,
-              const Eigen::Vector3d& lidar_position_base_m,
+              const Pose& T_base_lidar,
               const MatchingConfig& config,
               Workers& workers);
 
   /// Looks up the planes again when the pose has moved since the last time by more than planes
   /// can forgive; else only residuals and weights are new.
   PoseInformation linearise(const Pose& T_odom_base);
+
+  /// The same with the extrinsic as unknown, r = n . (R (R_bl p_l + t_bl) + p) + d. Where the map's
+  /// origin is known (R_0, p_0, and the extrinsic then), the plane moves with the extrinsic as the
+  /// points that made it do; elsewhere the residual is taken to know nothing of the extrinsic.
+  PoseAndExtrinsicInformation linearise(const Pose& T_odom_base,
+                                        const Pose& T_base_lidar,
+                                        const MapOrigins& origins);
 
   /// Share of the points that lie within `distance_m` of their plane at the last linearisation.
   double share_within(double distance_m) const;
@@ -42,6 +50,15 @@ class ScanMatcher {
     double range_m;
     PlaneMatch plane;
     double residual_m;
+    const MapOrigin* origin;  ///< of the plane; null: unknown, or not asked for
+  };
+
+  /// What is put in front of the residuals of one linearisation.
+  struct Viewpoint {
+    Pose T_odom_base;
+    Eigen::Matrix3d R_odom_base;
+    Pose T_base_lidar;
+    Pose T_base_base;  ///< from the axes of the points to those of the present extrinsic
   };
 
   bool must_match_again(const Pose& T_odom_base) const;
@@ -51,11 +68,15 @@ class ScanMatcher {
                    const Eigen::Vector3d& p,
                    Residual& residual) const;
   double variance_m2(const Residual& residual, double cos_incidence) const;
-  PoseInformation sum_of(std::size_t block, const Pose& T_odom_base);
+  double weight_of(const Residual& residual, double cos_incidence) const;
+  void add(Residual& residual, const Viewpoint& view, PoseInformation& sum) const;
+  void add(Residual& residual, const Viewpoint& view, PoseAndExtrinsicInformation& sum) const;
+  template <int Size>
+  Information<Size> sum_of_all(const Viewpoint& view, std::vector<Information<Size>>& sums);
 
   const PointCloud& points_base_;
   const LocalMap& map_;
-  Eigen::Vector3d lidar_position_base_m_;
+  Pose T_base_lidar_;
   const MatchingConfig& config_;
   Workers& workers_;
   bool matched_{false};
@@ -63,7 +84,9 @@ class ScanMatcher {
   std::vector<Residual> residuals_;
   std::vector<Residual> slots_;  ///< one a point, while matching
   std::vector<std::uint8_t> has_match_;
-  std::vector<PoseInformation> sums_;  ///< of blocks
+  // Of blocks.
+  std::vector<PoseInformation> sums_;
+  std::vector<PoseAndExtrinsicInformation> sums_with_extrinsic_;
 };
 
 }  // namespace trigpoint::lio_mapper

@@ -255,10 +255,13 @@ bool can_start(const StartConfig& config, const ImuBuffer& imu, const std::deque
          to_seconds(imu.newest_ns() - sweeps.front().begin_ns) >= config.window_s;
 }
 
-StartResult start(const Config& config,
+StartResult start(const Config& configured,
                   const Pose& T_base_lidar,
                   const ImuBuffer& imu,
                   const std::deque<Sweep>& sweeps) {
+  // A trial is too short to say anything about the extrinsic.
+  Config config = configured;
+  config.extrinsic.estimate = false;
   StartResult result;
   const Nanoseconds stamp_ns = start_stamp(imu, sweeps);
   const Nanoseconds window_ns = from_seconds(config.start.window_s);

@@ -65,7 +65,7 @@ bool can_start(const StartConfig& config, const ImuBuffer& imu, const std::deque
 
 /// Levels, finds the first velocity by trying forward speeds on the first two sweeps, and in motion
 /// levels again with the gravity that a trial run over the waiting sweeps found.
-StartResult start(const Config& config,
+StartResult start(const Config& configured,
                   const Pose& T_base_lidar,
                   const ImuBuffer& imu,
                   const std::deque<Sweep>& sweeps);

@@ -13,7 +13,7 @@ using Eigen::Vector3d;
 bool State::is_finite() const {
   return T_odom_base.is_finite() && v_odom_mps.allFinite() && gyro_bias_radps.allFinite() &&
          accel_bias_mps2.allFinite() && gravity_odom_mps2.allFinite() && T_map_odom.p.allFinite() &&
-         std::isfinite(T_map_odom.yaw_rad);
+         std::isfinite(T_map_odom.yaw_rad) && T_base_lidar.is_finite();
 }
 
 Eigen::Matrix<double, 3, 2> gravity_tangent(const Vector3d& gravity) {
@@ -26,6 +26,9 @@ State boxplus(const State& state, const ErrorVector& e) {
   moved.T_odom_base.p += e.segment<3>(error::kPosition);
   moved.T_odom_base.q =
       (state.T_odom_base.q * so3_exp(e.segment<3>(error::kRotation))).normalized();
+  moved.T_base_lidar.p += e.segment<3>(error::kExtrinsicPosition);
+  moved.T_base_lidar.q =
+      (state.T_base_lidar.q * so3_exp(e.segment<3>(error::kExtrinsicRotation))).normalized();
   moved.v_odom_mps += e.segment<3>(error::kVelocity);
   moved.gyro_bias_radps += e.segment<3>(error::kGyroBias);
   moved.accel_bias_mps2 += e.segment<3>(error::kAccelBias);
@@ -68,6 +71,9 @@ ErrorVector boxminus(const State& to, const State& from) {
   ErrorVector e;
   e.segment<3>(error::kPosition) = to.T_odom_base.p - from.T_odom_base.p;
   e.segment<3>(error::kRotation) = so3_log(from.T_odom_base.q.conjugate() * to.T_odom_base.q);
+  e.segment<3>(error::kExtrinsicRotation) =
+      so3_log(from.T_base_lidar.q.conjugate() * to.T_base_lidar.q);
+  e.segment<3>(error::kExtrinsicPosition) = to.T_base_lidar.p - from.T_base_lidar.p;
   e.segment<3>(error::kVelocity) = to.v_odom_mps - from.v_odom_mps;
   e.segment<3>(error::kGyroBias) = to.gyro_bias_radps - from.gyro_bias_radps;
   e.segment<3>(error::kAccelBias) = to.accel_bias_mps2 - from.accel_bias_mps2;
@@ -85,6 +91,8 @@ PriorJacobian prior_jacobian(const State& state,
   const Vector3d rotation = difference.segment<3>(error::kRotation);
   jacobian.rotation = so3_right_jacobian_inverse(rotation);
   jacobian.inverse_rotation = so3_right_jacobian(rotation);
+  jacobian.inverse_extrinsic_rotation =
+      so3_right_jacobian(difference.segment<3>(error::kExtrinsicRotation));
   jacobian.gravity = gravity_tangent(prior.gravity_odom_mps2).transpose() *
                      gravity_tangent(state.gravity_odom_mps2);
   jacobian.inverse_gravity = jacobian.gravity.inverse();
@@ -94,6 +102,8 @@ PriorJacobian prior_jacobian(const State& state,
 ErrorVector to_tangent_of_state(const PriorJacobian& jacobian, const ErrorVector& e) {
   ErrorVector turned = e;
   turned.segment<3>(error::kRotation) = jacobian.inverse_rotation * e.segment<3>(error::kRotation);
+  turned.segment<3>(error::kExtrinsicRotation) =
+      jacobian.inverse_extrinsic_rotation * e.segment<3>(error::kExtrinsicRotation);
   turned.segment<2>(error::kGravity) = jacobian.inverse_gravity * e.segment<2>(error::kGravity);
   return turned;
 }
@@ -103,6 +113,8 @@ ErrorMatrix transition_to_tangent_of_state(const PriorJacobian& jacobian,
   ErrorMatrix turned = transition;
   turned.middleRows<3>(error::kRotation) =
       jacobian.inverse_rotation * transition.middleRows<3>(error::kRotation);
+  turned.middleRows<3>(error::kExtrinsicRotation) =
+      jacobian.inverse_extrinsic_rotation * transition.middleRows<3>(error::kExtrinsicRotation);
   turned.middleRows<2>(error::kGravity) =
       jacobian.inverse_gravity * transition.middleRows<2>(error::kGravity);
   return turned;

@@ -15,16 +15,19 @@ namespace trigpoint::lio_mapper {
 
 /// Where each block of the error sits.
 namespace error {
-inline constexpr int kPosition = 0;          ///< odom, m
-inline constexpr int kRotation = 3;          ///< R_true = R exp(e): body axes, rad
-inline constexpr int kVelocity = 6;          ///< odom, m/s
-inline constexpr int kGyroBias = 9;          ///< rad/s
-inline constexpr int kAccelBias = 12;        ///< m/s^2
-inline constexpr int kGravity = 15;          ///< 2 angles on the sphere, rad
-inline constexpr int kYawMapOdom = 17;       ///< rad
-inline constexpr int kPositionMapOdom = 18;  ///< m
-inline constexpr int kSize = 21;
-inline constexpr int kPose = 6;  ///< position and rotation come first
+inline constexpr int kPosition = 0;           ///< odom, m
+inline constexpr int kRotation = 3;           ///< R_true = R exp(e): body axes, rad
+inline constexpr int kExtrinsicRotation = 6;  ///< R_base_lidar = R exp(e): LiDAR axes, rad
+inline constexpr int kExtrinsicPosition = 9;  ///< of the LiDAR, base, m
+inline constexpr int kVelocity = 12;          ///< odom, m/s
+inline constexpr int kGyroBias = 15;          ///< rad/s
+inline constexpr int kAccelBias = 18;         ///< m/s^2
+inline constexpr int kGravity = 21;           ///< 2 angles on the sphere, rad
+inline constexpr int kYawMapOdom = 23;        ///< rad
+inline constexpr int kPositionMapOdom = 24;   ///< m
+inline constexpr int kSize = 27;
+inline constexpr int kPose = 6;               ///< position and rotation come first
+inline constexpr int kPoseAndExtrinsic = 12;  ///< then the extrinsic: all that a scan sees
 }  // namespace error
 
 using ErrorVector = Eigen::Matrix<double, error::kSize, 1>;
@@ -38,6 +41,7 @@ struct State {
   /// Acceleration of free fall in odom; its magnitude is fixed, its direction estimated.
   Eigen::Vector3d gravity_odom_mps2{0.0, 0.0, -9.80665};
   YawPose T_map_odom;  ///< without tilt: that is in the gravity
+  Pose T_base_lidar;
 
   bool is_finite() const;
 
@@ -66,6 +70,7 @@ ErrorVector boxminus(const State& to, const State& from);
 struct PriorJacobian {
   Eigen::Matrix3d rotation;
   Eigen::Matrix3d inverse_rotation;
+  Eigen::Matrix3d inverse_extrinsic_rotation;
   Eigen::Matrix2d gravity;
   Eigen::Matrix2d inverse_gravity;
 };

@@ -13,8 +13,9 @@
 
 namespace trigpoint::lio_mapper::store {
 
-inline constexpr int kFormatVersion = 4;     ///< PRAGMA user_version
-inline constexpr int kRawPointsVersion = 3;  ///< clouds as float32, no rows, no checkpoint
+inline constexpr int kFormatVersion = 5;       ///< PRAGMA user_version
+inline constexpr int kNoExtrinsicVersion = 4;  ///< checkpoint of a state without extrinsic
+inline constexpr int kRawPointsVersion = 3;    ///< clouds as float32, no rows, no checkpoint
 
 inline constexpr const char* kSchema =
     "CREATE TABLE keyframes("

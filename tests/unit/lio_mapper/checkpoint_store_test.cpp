@@ -54,7 +54,7 @@ Checkpoint checkpoint(int i) {
   c.aligned = true;
   c.T_map_odom = {0.3, {1e5 / 3.0, -2.0, 3.0}, {1e-3, 2e-3}};
   c.covariance = Eigen::MatrixXd::Random(21, 21);
-  c.drift_covariance = Eigen::Matrix4d::Random();
+  c.drift_covariance = Matrix6d::Random();
   c.distance_m = 123.4;
   c.next_keyframe = 17;
   c.scans_received = static_cast<std::uint64_t>(i);

@@ -50,7 +50,7 @@ TEST(Propagation, covariance_is_transported_by_the_transition_and_grows_by_the_n
   const ErrorMatrix F = transition_of(jacobian);
   ImuConfig noise;
   ErrorMatrix propagated = P;
-  propagate_covariance(jacobian, noise, 1.0, propagated);
+  propagate_covariance(jacobian, noise, noise_of(noise, kStep, 0.0), propagated);
   const ErrorMatrix Q = propagated - F * P * F.transpose();
   const double dt_s = kStep.duration_s();
   const double accel2 = noise.accel_noise_mps2_sqrthz * noise.accel_noise_mps2_sqrthz;
@@ -58,6 +58,30 @@ TEST(Propagation, covariance_is_transported_by_the_transition_and_grows_by_the_n
   EXPECT_NEAR(Q(error::kPosition, error::kVelocity), accel2 * dt_s * dt_s / 2.0, 1e-12);
   EXPECT_NEAR(Q(error::kPosition, error::kPosition), accel2 * dt_s * dt_s * dt_s / 3.0, 1e-12);
   EXPECT_NEAR(Q(error::kYawMapOdom, error::kYawMapOdom), 0.0, 1e-12);
+}
+
+/// A velocity error of sigma T after a gap of T: what a turn or a braking in it would leave.
+TEST(Propagation, over_a_gap_the_velocity_is_uncertain_by_a_motion_that_lasts) {
+  const ImuConfig config;
+  constexpr double kGap_s = 2.0;
+  ErrorMatrix P = ErrorMatrix::Zero();
+  State state;
+  for (int i = 0; i < 100; ++i) {
+    InertialStep step{{i * 20'000'000, {}, {0.0, 0.0, 9.80665}},
+                      {(i + 1) * 20'000'000, {}, {0.0, 0.0, 9.80665}}};
+    propagate_covariance(step_jacobian(state, step), config, noise_of(config, step, kGap_s), P);
+    state = propagate(state, step);
+  }
+  const double speed_mps = config.gap_accel_mps2 * kGap_s;
+  const double turn_rad = config.gap_gyro_radps * kGap_s;
+  EXPECT_NEAR(std::sqrt(P(error::kRotation, error::kRotation)), turn_rad, 0.01 * turn_rad);
+  // z: free of what the turn does to the direction of gravity.
+  EXPECT_NEAR(
+      std::sqrt(P(error::kVelocity + 2, error::kVelocity + 2)), speed_mps, 0.01 * speed_mps);
+  EXPECT_NEAR(std::sqrt(P(error::kPosition + 2, error::kPosition + 2)),
+              speed_mps * kGap_s / std::sqrt(3.0),
+              0.01 * speed_mps * kGap_s);
+  EXPECT_LT(noise_of(config, kStep, config.max_gap_s).accel2, 1e-3);
 }
 
 /// A circle of 20 m at 8 m/s, level, sampled at 100 Hz: closed form in velocity and position.

@@ -90,7 +90,7 @@ TEST_F(ScanFilterInAHall, undistortion_ends_at_the_sweeps_end_and_matches_nearly
 TEST(Drift, heading_noise_turns_about_the_robot_and_leaves_its_place_in_map) {
   const Eigen::Vector3d p_odom_m{1000.0, 0.0, 0.0};
   const Eigen::Matrix4d noise =
-      drift_noise({0.0, 1e-3}, 100.0, from_yaw(0.4).toRotationMatrix(), p_odom_m);
+      drift_noise(drift_rate({0.0, 1e-3}), 100.0, from_yaw(0.4).toRotationMatrix(), p_odom_m);
   // Position in map: yaw moves it by z x R p, translation directly.
   Eigen::Matrix<double, 3, 4> jacobian;
   jacobian.col(0) = Eigen::Vector3d::UnitZ().cross(from_yaw(0.4) * p_odom_m);
@@ -102,7 +102,7 @@ TEST(Drift, heading_noise_turns_about_the_robot_and_leaves_its_place_in_map) {
 TEST(Drift, tilt_noise_turns_odom_about_the_robot_and_leaves_its_place_in_map) {
   const State state = testing_support::random_state(4);
   ErrorMatrix covariance = ErrorMatrix::Zero();
-  add_drift_noise({0.0, 0.0, 1e-3}, 100.0, state, true, covariance);
+  add_drift_noise(drift_rate({0.0, 0.0, 1e-3}), 100.0, state, true, covariance);
   Path path;
   path.push_back({kEpoch_ns, state.T_odom_base, state.v_odom_mps});
   const auto H = predict_row(state, path, kEpoch_ns, Eigen::Vector3d::Zero()).jacobian;

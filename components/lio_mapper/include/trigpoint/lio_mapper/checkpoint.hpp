@@ -29,7 +29,7 @@ struct Checkpoint {
   YawPose T_map_odom;  ///< without tilt: that is in the gravity
   /// Of the error state, in its order (README); square.
   Eigen::MatrixXd covariance;
-  Eigen::Matrix4d drift_covariance{Eigen::Matrix4d::Zero()};  ///< of odom: yaw, x, y, z
+  Matrix6d drift_covariance{Matrix6d::Zero()};  ///< of odom, about its origin, ROS order
   double distance_m{0.0};
 
   std::uint64_t next_keyframe{0};

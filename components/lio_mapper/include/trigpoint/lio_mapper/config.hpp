@@ -54,7 +54,8 @@ struct ImuConfig {
   double initial_accel_bias_sigma_mps2{0.05};
   double max_gap_s{0.1};   ///< longer intervals between samples are bridged with inflated noise
   double lost_gap_s{0.5};  ///< sweeps that an interval longer than this touches are refused
-  double gap_noise_factor{20.0};
+  double gap_accel_mps2{0.5};  ///< sigma by which the bridged motion is wrong in a long gap
+  double gap_gyro_radps{0.2};
 };
 
 struct StartConfig {
@@ -78,6 +79,13 @@ struct MatchingConfig {
   double lost_after_s{2.0};  ///< coasting longer than this is LOST
 };
 
+/// Estimation of where the LiDAR sits, about the configured place.
+struct ExtrinsicConfig {
+  bool estimate{false};
+  double rotation_sigma_rad{0.03};
+  double position_sigma_m{0.05};
+};
+
 struct LocalMapConfig {
   double half_side_m{150.0};  ///< of the cube around the robot that is kept
   double prune_every_m{10.0};
@@ -91,6 +99,8 @@ struct DriftConfig {
   double position_sigma_m_sqrtm{0.02};
   double yaw_sigma_rad_sqrtm{3.5e-4};
   double tilt_sigma_rad_sqrtm{1e-4};
+  /// Share of the pose's covariance relative to the local map that the map inherits per metre.
+  double map_renewal_per_m{0.0};
 };
 
 struct RowsConfig {
@@ -122,6 +132,7 @@ struct Config {
   ImuConfig imu;
   StartConfig start;
   MatchingConfig matching;
+  ExtrinsicConfig extrinsic;
   LocalMapConfig local_map;
   DriftConfig drift;
   RowsConfig rows;

@@ -55,6 +55,16 @@ struct Output {
   Events events;
 };
 
+/// What the mapper found out about the sensors.
+struct Calibration {
+  Pose T_base_lidar;  ///< in use: configured, or estimated
+  /// Position in base, rotation about LiDAR axes; zero unless estimated.
+  Matrix6d extrinsic_covariance = Matrix6d::Zero();
+  /// To be added to LiDAR stamps, on top of sweep.time_offset_s; NaN until it is known.
+  double clock_offset_s{kNaN};
+  double clock_offset_sigma_s{kNaN};
+};
+
 /// FAST-LIO2-style estimator [W. Xu et al., FAST-LIO2, T-RO 2022] with T_map_odom in its state.
 /// Deterministic and single-threaded to its user; no clock: the same inputs in the same order give
 /// the same bits. Never throws on data: refused inputs are counted in LioStatus and told as events.
@@ -91,6 +101,8 @@ class LioMapper {
 
   /// The points of the local map, in odom.
   PointCloud local_map() const;
+
+  Calibration calibration() const;
 
   /// The newest status, also between scans.
   LioStatus status() const;

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "clock_offset.hpp"
+
+#include "trigpoint/base/so3.hpp"
+
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <cmath>
+
+namespace trigpoint::lio_mapper {
+
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+namespace {
+
+constexpr double kWindow_s = 3.0;
+constexpr std::size_t kFewest = 12;  ///< scans in a window that counts
+constexpr double kLongestStep_s = 0.02;
+/// A longer interval between two scans ends the window.
+constexpr double kLongestPause_s = 0.35;
+constexpr double kPriorOffset_s = 0.1;
+/// Crystals differ by 20 to 100 parts in a million.
+constexpr double kPriorRate = 1e-4;
+constexpr double kRateWalk_sqrts = 5e-6;
+constexpr std::size_t kFewestWindows = 5;
+/// Noise and excess are means over about so many windows.
+constexpr double kMemory_windows = 15.0;
+/// An innovation beyond this many sigmas counts as that many.
+constexpr double kClip = 3.0;
+constexpr double kKnown_s = 2e-3;
+
+/// Least squares of y = a + b t + d w over a window, three axes with their own a and b.
+struct WindowFit {
+  double information{0.0};  ///< sum of w^2 after a and b took their share
+  double offset_s{0.0};
+  double residual2_rad2{0.0};  ///< mean of squares, free of the parameters' share
+};
+
+/// What a line through the samples leaves of them.
+std::vector<double> without_line(const std::vector<double>& t, std::vector<double> y) {
+  const auto n = static_cast<double>(t.size());
+  double mean_t = 0.0;
+  double mean_y = 0.0;
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    mean_t += t[i] / n;
+    mean_y += y[i] / n;
+  }
+  double tt = 0.0;
+  double ty = 0.0;
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    tt += (t[i] - mean_t) * (t[i] - mean_t);
+    ty += (t[i] - mean_t) * (y[i] - mean_y);
+  }
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    y[i] -= mean_y + (tt > 0.0 ? ty / tt : 0.0) * (t[i] - mean_t);
+  }
+  return y;
+}
+
+}  // namespace
+
+void ClockOffsetEstimator::interrupt() {
+  close_window();
+  window_.clear();
+}
+
+void ClockOffsetEstimator::add(Nanoseconds stamp_ns,
+                               const Quaterniond& q_odom_base,
+                               const Vector3d& gyro_bias_radps,
+                               const ImuBuffer& imu) {
+  const bool ends = !window_.empty() && (to_seconds(stamp_ns - newest_ns_) > kLongestPause_s ||
+                                         to_seconds(stamp_ns - begin_ns_) > kWindow_s);
+  if (ends) {
+    interrupt();
+  }
+  const auto steps = window_.empty() ? imu.steps_between(stamp_ns - 1, stamp_ns, kLongestStep_s)
+                                     : imu.steps_between(newest_ns_, stamp_ns, kLongestStep_s);
+  if (steps.empty()) {
+    return;
+  }
+  Sample sample{0.0, q_odom_base, q_odom_base, Vector3d::Zero()};
+  if (window_.empty()) {
+    begin_ns_ = stamp_ns;
+    gyro_bias_radps_ = gyro_bias_radps;
+  } else {
+    sample.time_s = to_seconds(stamp_ns - begin_ns_);
+    sample.q_gyro = window_.back().q_gyro;
+    for (const InertialStep& step : steps) {
+      sample.q_gyro =
+          sample.q_gyro *
+          so3_exp(step.duration_s() *
+                  (0.5 * (step.begin.gyro_radps + step.end.gyro_radps) - gyro_bias_radps_));
+    }
+    sample.q_gyro.normalize();
+  }
+  sample.rate_odom_radps = q_odom_base * (steps.back().end.gyro_radps - gyro_bias_radps_);
+  window_.push_back(sample);
+  newest_ns_ = stamp_ns;
+}
+
+void ClockOffsetEstimator::close_window() {
+  if (window_.size() < kFewest) {
+    return;
+  }
+  std::vector<double> t;
+  for (const Sample& sample : window_) {
+    t.push_back(sample.time_s);
+  }
+  WindowFit fit;
+  double wy = 0.0;
+  double yy = 0.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> y;
+    std::vector<double> w;
+    for (const Sample& sample : window_) {
+      y.push_back(so3_log(sample.q_scan * sample.q_gyro.conjugate())[axis]);
+      w.push_back(sample.rate_odom_radps[axis]);
+    }
+    y = without_line(t, std::move(y));
+    w = without_line(t, std::move(w));
+    for (std::size_t i = 0; i < t.size(); ++i) {
+      fit.information += w[i] * w[i];
+      wy += w[i] * y[i];
+      yy += y[i] * y[i];
+    }
+  }
+  if (fit.information <= 0.0) {
+    return;
+  }
+  fit.offset_s = wy / fit.information;
+  const double freedom = 3.0 * (static_cast<double>(t.size()) - 2.0) - 1.0;
+  fit.residual2_rad2 = std::max(0.0, yy - fit.offset_s * wy) / freedom;
+
+  const double share = 1.0 / std::min(static_cast<double>(++windows_), kMemory_windows);
+  noise2_rad2_ += share * (fit.residual2_rad2 - noise2_rad2_);
+  const Nanoseconds middle_ns = begin_ns_ + (newest_ns_ - begin_ns_) / 2;
+  if (windows_ == 1) {
+    covariance_ =
+        Eigen::Vector2d(kPriorOffset_s * kPriorOffset_s, kPriorRate * kPriorRate).asDiagonal();
+  } else {
+    const double dt_s = to_seconds(middle_ns - updated_ns_);
+    Eigen::Matrix2d transition = Eigen::Matrix2d::Identity();
+    transition(0, 1) = dt_s;
+    state_ = transition * state_;
+    covariance_ = transition * covariance_ * transition.transpose();
+    covariance_(1, 1) += kRateWalk_sqrts * kRateWalk_sqrts * dt_s;
+  }
+  updated_ns_ = middle_ns;
+  // A window that fits worse than the others counts by itself.
+  const double noise2 = std::max(noise2_rad2_, fit.residual2_rad2) / fit.information * excess_;
+  const double innovation = fit.offset_s - state_[0];
+  const double variance = covariance_(0, 0) + noise2;
+  const double ratio2 = innovation * innovation / variance;
+  if (windows_ > kFewestWindows) {
+    const double seen = std::min(ratio2, kClip * kClip) * excess_;
+    excess_ = std::max(1.0, excess_ + (seen - excess_) / kMemory_windows);
+  }
+  const double robust = std::max(1.0, std::sqrt(ratio2) / kClip);
+  const Eigen::Vector2d gain = covariance_.col(0) / (covariance_(0, 0) + robust * noise2);
+  state_ += gain * innovation;
+  covariance_ = (covariance_ - gain * covariance_.row(0)).eval();
+}
+
+std::optional<ClockOffset> ClockOffsetEstimator::estimate() const {
+  const double sigma_s = std::sqrt(std::max(0.0, covariance_(0, 0)));
+  if (windows_ < kFewestWindows || sigma_s > kKnown_s) {
+    return std::nullopt;
+  }
+  return ClockOffset{state_[0], sigma_s};
+}
+
+}  // namespace trigpoint::lio_mapper
