@@ -93,6 +93,11 @@ void describe_matching(MatchingConfig& c, ConfigFields& f) {
            "noise of a beam's direction; matters far away at grazing incidence",
            kNotNegative);
   f.number("robust_width", c.robust_width, "Huber width in sigmas", kPositive);
+  f.number("grazing_cos",
+           c.grazing_cos,
+           "a plane that the beam hits at an angle with this cosine has half its weight, flatter "
+           "ones less: points of one ring lie on such a plane also where there is no surface",
+           kNotNegative);
   f.number("independent_residuals",
            c.independent_residuals,
            "the residuals of a scan together weigh as at most this many independent ones, because "

@@ -96,7 +96,9 @@ double ScanMatcher::variance_m2(const Residual& r, double cos_incidence) const {
 double ScanMatcher::weight_of(const Residual& r, double cos_incidence) const {
   const double variance = variance_m2(r, cos_incidence);
   const double ratio = std::abs(r.residual_m) / (config_.robust_width * std::sqrt(variance));
-  return (ratio > 1.0 ? 1.0 / ratio : 1.0) / variance;
+  const double cos2 = cos_incidence * cos_incidence;
+  const double surface = cos2 / (cos2 + config_.grazing_cos * config_.grazing_cos + 1e-12);
+  return surface * (ratio > 1.0 ? 1.0 / ratio : 1.0) / variance;
 }
 
 void ScanMatcher::add(Residual& r, const Viewpoint& view, PoseInformation& sum) const {

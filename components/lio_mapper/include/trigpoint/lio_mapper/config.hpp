@@ -52,8 +52,8 @@ struct ImuConfig {
   double accel_bias_walk_mps2_sqrts{3e-4};
   double initial_gyro_bias_sigma_radps{0.01};
   double initial_accel_bias_sigma_mps2{0.05};
-  double max_gap_s{0.1};   ///< longer intervals between samples are bridged with inflated noise
-  double lost_gap_s{0.5};  ///< sweeps that an interval longer than this touches are refused
+  double max_gap_s{0.1};       ///< longer intervals between samples are bridged with inflated noise
+  double lost_gap_s{0.5};      ///< sweeps that an interval longer than this touches are refused
   double gap_accel_mps2{0.5};  ///< sigma by which the bridged motion is wrong in a long gap
   double gap_gyro_radps{0.2};
 };
@@ -70,6 +70,7 @@ struct MatchingConfig {
   double range_sigma_m{0.02};
   double angle_sigma_rad{1.5e-3};  ///< beam direction and divergence: counts at grazing incidence
   double robust_width{2.0};        ///< residuals beyond this many sigmas lose weight (Huber)
+  double grazing_cos{0.15};        ///< planes that the beam hits more flatly lose weight
   double independent_residuals{100.0};  ///< residuals count as at most this many independent ones
   std::int64_t min_matches{50};
   std::int64_t max_iterations{5};
