@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
 // GPS faults as the overlays of the scenarios combine them.
+#include "trigpoint/geodesy/local_frame.hpp"
+
 #include "entries.hpp"
 #include "faults.hpp"
 #include <gtest/gtest.h>
@@ -131,6 +133,35 @@ TEST(GpsChanges, deliver_the_same_fixes_late_shuffled_and_again) {
     ASSERT_NE(same, sorted.end());
     EXPECT_EQ(same->latitude_deg, fix.latitude_deg);
   }
+}
+
+TEST(TrueFixes, tell_what_was_lost_and_by_how_much_the_others_are_off) {
+  constexpr double kNoise_m = 0.15;  // six sigmas of a fixed solution's height
+  const Scenario scenario = load_scenario("campus+wrong_fix");
+  const auto reader = open_scenario(scenario, 1, std::nullopt, {false});
+  const auto truths = reader->true_fixes();
+  const auto messages = messages_of<GnssFix>(all_of(*reader));
+  const geodesy::LocalFrame frame(scenario.datum);
+  EXPECT_EQ(truths.size(), reader->true_fixes().size());
+  std::size_t delivered = 0;
+  bool any_wrong = false;
+  for (const FixTruth& truth : truths) {
+    const auto message = std::find_if(messages.begin(), messages.end(), [&](const GnssFix& fix) {
+      return fix.stamp_ns == truth.stamp_ns;
+    });
+    ASSERT_EQ(message == messages.end(), truth.lost);
+    if (truth.lost) {
+      EXPECT_NEAR(seconds(scenario, truth.stamp_ns), 45.0, 10.1);
+      continue;
+    }
+    ++delivered;
+    any_wrong = any_wrong || truth.fault_error_enu_m.norm() > 2.0;
+    const auto place =
+        frame.to_map({message->latitude_deg, message->longitude_deg, message->altitude_m});
+    ASSERT_LT((*place - truth.antenna_map_m - truth.fault_error_enu_m).norm(), kNoise_m);
+  }
+  EXPECT_EQ(delivered, messages.size());
+  EXPECT_TRUE(any_wrong);
 }
 
 TEST(GpsChanges, bring_the_first_fix_after_300_m) {
