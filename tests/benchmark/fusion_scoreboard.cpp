@@ -215,7 +215,9 @@ std::string Scoreboard::print_ratios(const std::string& mode) const {
   for (const Group& group : groups_) {
     for (const Line& line : group.lines) {
       const auto ours = line.by_mode.find(mode);
-      if (ours == line.by_mode.end() || !is_judged(ours->second)) {
+      // Errors only: counts may be zero, and ANEES is not the better the smaller.
+      if (ours == line.by_mode.end() || ours->second.front().judged_by_mean ||
+          bounds_of(line.by_mode).empty() || ours->second.front().bound.highest == 0.0) {
         continue;
       }
       text += "| " + group.scenario + ", " + line.name + " |";

@@ -6,11 +6,10 @@
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdint>
 #include <cstdio>
-#include <fstream>
-#include <map>
+#include <future>
+#include <iterator>
 #include <set>
 #include <string>
 #include <vector>
@@ -26,6 +25,7 @@ struct Options {
   std::uint64_t seeds{5};
   std::uint64_t first_seed{1};
   std::uint64_t short_runs{50};
+  std::uint64_t jobs{1};
   std::string csv;
   bool only_faults{false};
   cli::InputOptions input;
@@ -67,6 +67,17 @@ void print(const std::string& text) {
   std::fflush(stdout);
 }
 
+void tell(const Drive& result) {
+  std::fprintf(stderr,
+               "%s, seed %llu done; processor time of the cores:",
+               result.scenario.c_str(),
+               static_cast<unsigned long long>(result.seed));
+  for (const auto& [mode, run] : result.runs) {
+    std::fprintf(stderr, " %s %.0f s", mode.c_str(), run.process_s);
+  }
+  std::fprintf(stderr, "\n");
+}
+
 /// All seeds of one scenario.
 void run_scenario(const std::string& scenario,
                   const std::vector<Row>& its_rows,
@@ -78,21 +89,21 @@ void run_scenario(const std::string& scenario,
   DriveOptions one{options.input, options.modes, any(&Row::sorted)};
   one.input.log = scenario;
   const std::uint64_t seeds = any(&Row::many_short) ? options.short_runs : options.seeds;
-  for (std::uint64_t i = 0; i < seeds; ++i) {
-    one.input.seed = options.first_seed + i;
-    const auto start = std::chrono::steady_clock::now();
-    const Drive result = drive(one);
-    for (const Row& row : its_rows) {
-      for (const std::string& mode : options.modes) {
-        scores.add(row, mode, *one.input.seed, row.score(result, mode));
-      }
+  for (std::uint64_t i = 0; i < seeds; i += options.jobs) {
+    std::vector<std::future<Drive>> drives;
+    for (std::uint64_t job = i; job < std::min(seeds, i + options.jobs); ++job) {
+      one.input.seed = options.first_seed + job;
+      drives.push_back(std::async(std::launch::async, drive, one));
     }
-    const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
-    std::fprintf(stderr,
-                 "%s, seed %llu: %.0f s\n",
-                 scenario.c_str(),
-                 static_cast<unsigned long long>(*one.input.seed),
-                 wall.count());
+    for (std::future<Drive>& each : drives) {
+      const Drive result = each.get();
+      for (const Row& row : its_rows) {
+        for (const std::string& mode : options.modes) {
+          scores.add(row, mode, result.seed, row.score(result, mode));
+        }
+      }
+      tell(result);
+    }
   }
 }
 
@@ -192,6 +203,7 @@ int main(int argc, char** argv) {
   app.add_option("--first-seed", options.first_seed, "the others follow it");
   app.add_option("--short-runs", options.short_runs, "runs of the row of consistency")
       ->check(CLI::PositiveNumber);
+  app.add_option("--jobs", options.jobs, "seeds at a time")->check(CLI::PositiveNumber);
   app.add_option("--duration", options.input.duration_s, "only so much of each drive, s")
       ->check(CLI::PositiveNumber);
   app.add_option("--config", options.input.config_files, "overlays of the configuration");
