@@ -52,9 +52,20 @@ double rmse_m(const std::vector<evaluation::PosePair>& pairs, AlignmentKind alig
            : kNaN;
 }
 
-Figure largest_step(const Run& run, Bound bound = {}) {
+Figure largest_step(const Drive& drive, const Run& run, Bound bound = {}) {
   const auto step = evaluation::largest_step_over(run.fused, run.odom, kStepInterval_ns);
-  return figure("largest step in 100 ms, m", step.intervals > 0 ? step.distance_m : kNaN, bound);
+  Figure result =
+      figure("largest step in 100 ms, m", step.intervals > 0 ? step.distance_m : kNaN, bound);
+  result.detail =
+      "after " + std::to_string(to_seconds(step.stamp_ns - drive.truth->first_ns())) + " s";
+  return result;
+}
+
+/// An estimate that begins late has less to be scored.
+Figure first_pose(const Drive& drive, const Run& run) {
+  return figure(
+      "first pose in map after, s",
+      run.fused.empty() ? kNaN : to_seconds(run.fused.front().stamp_ns - drive.truth->first_ns()));
 }
 
 std::string numbered(const std::string& name, std::size_t i, std::size_t n) {
@@ -62,17 +73,18 @@ std::string numbered(const std::string& name, std::size_t i, std::size_t n) {
 }
 
 /// The root mean square error without alignment and with yaw and translation.
-Figures whole_drive(const Run& run, double bound_m) {
+Figures whole_drive(const Drive& drive, const Run& run, double bound_m) {
   return {
       figure(
           "RMSE without alignment, m", rmse_m(run.pairs, AlignmentKind::kNone), at_most(bound_m)),
       figure("RMSE aligned in yaw and translation, m",
-             rmse_m(run.pairs, AlignmentKind::kYawTranslation))};
+             rmse_m(run.pairs, AlignmentKind::kYawTranslation)),
+      first_pose(drive, run)};
 }
 
 Figures campus_twice(const Drive& drive, const std::string& mode) {
   const Run& run = drive.runs.at(mode);
-  Figures figures = whole_drive(run, 0.05);
+  Figures figures = whole_drive(drive, run, 0.05);
   const Run* lio = drive.run_of("lio");
   const double lio_m = lio ? rmse_m(lio->pairs, AlignmentKind::kYawTranslation) : kNaN;
   Figure ratio = figure("RMSE / aligned RMSE of mode lio", figures[0].value / lio_m);
@@ -80,7 +92,7 @@ Figures campus_twice(const Drive& drive, const std::string& mode) {
     ratio.bound = at_most(0.3);
   }
   figures.push_back(ratio);
-  figures.push_back(largest_step(run));
+  figures.push_back(largest_step(drive, run));
   return figures;
 }
 
@@ -104,12 +116,12 @@ Figures outage(const Drive& drive, const std::string& mode) {
     }
     figures.push_back(back);
   }
-  figures.push_back(largest_step(run, at_most(kLargestStep_m)));
+  figures.push_back(largest_step(drive, run, at_most(kLargestStep_m)));
   return figures;
 }
 
 Figures long_drive(const Drive& drive, const std::string& mode) {
-  Figures figures = whole_drive(drive.runs.at(mode), 0.15);
+  Figures figures = whole_drive(drive, drive.runs.at(mode), 0.15);
   const Figures of_outages = outage(drive, mode);
   figures.insert(figures.end(), of_outages.begin(), of_outages.end());
   return figures;
@@ -178,12 +190,13 @@ Figures wrong_fix(const Drive& drive, const std::string& mode) {
   const auto windows = stretches(drive, is_wrong);
   return {worst_in(run, windows, at_most(kWrongFixError_m)),
           closing(drive, run, windows),
-          largest_step(run)};
+          largest_step(drive, run)};
 }
 
 Figures frozen_covariance(const Drive& drive, const std::string& mode) {
   const Run& run = drive.runs.at(mode);
-  return {worst_in(run, stretches(drive, is_wrong), at_most(kFaultError_m)), largest_step(run)};
+  return {worst_in(run, stretches(drive, is_wrong), at_most(kFaultError_m)),
+          largest_step(drive, run)};
 }
 
 /// Ours over the lesser of what the modes hard and fusion reach on the same drive.
@@ -210,7 +223,7 @@ Figures urban(const Drive& drive, const std::string& mode) {
   const auto windows = stretches(drive, is_wrong);
   return {worst_in(run, windows, at_most(kFaultError_m)),
           against_plain_modes(drive, mode, windows),
-          largest_step(run)};
+          largest_step(drive, run)};
 }
 
 /// Errors of the fixes themselves inside the windows.
@@ -237,7 +250,7 @@ Figures degenerate(const Drive& drive, const std::string& mode) {
                  evaluation::worst_error_m(run.pairs, windows).value_or(kNaN),
                  at_most(gps.max + kOverGps_m)),
           figure("worst error of the fixes in it, m", gps.max),
-          largest_step(run)};
+          largest_step(drive, run)};
 }
 
 Figures height(const Drive& drive, const std::string& mode) {
@@ -256,7 +269,7 @@ Figures height(const Drive& drive, const std::string& mode) {
           evaluation::excess_over_distance_m(run.pairs, from_ns, kUp, kHeightShare).value_or(kNaN),
           at_most(kHeightError_m)),
       figure("worst z error, m", all.axes_m[2].max),
-      largest_step(run)};
+      largest_step(drive, run)};
 }
 
 /// Moments at which a run whose fixes come late cannot yet know what the sorted one knows: until 2
@@ -302,7 +315,7 @@ Figures against_sorted(const Drive& drive, const std::string& mode) {
                      .value_or(kNaN),
                  at_most(kSortedDifference_m)),
           figure("RMSE without alignment, m", rmse_m(run.pairs, AlignmentKind::kNone)),
-          largest_step(run)};
+          largest_step(drive, run)};
 }
 
 Figures consistency(const Drive& drive, const std::string& mode) {

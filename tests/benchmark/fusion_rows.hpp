@@ -26,6 +26,7 @@ struct Figure {
   Bound bound;                 ///< of this run; none: told, not judged
   std::optional<bool> met;     ///< instead of the bound, where it is no number alone
   std::string words;           ///< what was said, where the row asks for it
+  std::string detail;          ///< for the CSV only
   bool judged_by_mean{false};  ///< the mean over the seeds is what the bound is about
 
   bool is_judged() const { return met || bound.lowest || bound.highest; }

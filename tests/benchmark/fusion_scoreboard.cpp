@@ -99,7 +99,7 @@ Scoreboard::Scoreboard(std::vector<std::string> modes, const std::string& csv)
     return;
   }
   csv_.open(csv);
-  csv_ << "scenario,mode,seed,figure,value,lowest,highest,met,words\n";
+  csv_ << "scenario,mode,seed,figure,value,lowest,highest,met,words,detail\n";
   csv_.flush();
   if (!csv_) {
     throw std::runtime_error(csv +
@@ -142,7 +142,7 @@ void Scoreboard::add(const Row& row,
            << ',' << figure.value << ',' << number(figure.bound.lowest) << ','
            << number(figure.bound.highest) << ','
            << (figure.is_judged() ? (figure.is_met() ? "yes" : "no") : "") << ','
-           << quoted(figure.words) << '\n';
+           << quoted(figure.words) << ',' << quoted(figure.detail) << '\n';
     }
   }
   csv_.flush();

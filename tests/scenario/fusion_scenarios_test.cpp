@@ -172,6 +172,34 @@ TEST(FusionScenarios, deliver_the_same_fixes_when_they_come_late_shuffled_or_aga
   }
 }
 
+TEST(FusionDrive, runs_every_mode_and_the_sorted_fixes_on_the_same_sensors) {
+  DriveOptions options;
+  options.input.log = "short";
+  options.input.seed = 1;
+  options.input.duration_s = 14.0;
+  options.modes = {"lio", "hard"};
+  options.sorted = true;
+  const Drive result = drive(options);
+  const fusion_table::Run& lio = result.runs.at("lio");
+  const fusion_table::Run& hard = result.runs.at("hard");
+  ASSERT_FALSE(hard.fused.empty());
+  EXPECT_EQ(hard.fused.size(), hard.pairs.size());
+  EXPECT_EQ(lio.odom.size(), hard.odom.size());
+  EXPECT_LT(evaluation::absolute_error(hard.pairs).position_m.max, 0.5);
+  EXPECT_GT(hard.nees_pose, 0.0);
+  const auto rows_of = [](const fusion_table::Run& run) {
+    return std::count_if(run.judgements.begin(), run.judgements.end(), [](const auto& judged) {
+      return judged.second.moves[0];
+    });
+  };
+  EXPECT_GT(rows_of(hard), 10);
+  EXPECT_EQ(rows_of(lio), 0);
+  // In time and in order they come anyway: only the latency's jitter is gone.
+  EXPECT_EQ(rows_of(result.sorted_runs.at("hard")), rows_of(hard));
+  EXPECT_LT(evaluation::largest_difference_m(hard.fused, result.sorted_runs.at("hard").fused, {}),
+            0.02);
+}
+
 TEST(FusionModes, are_those_of_the_gate) {
   const auto modes = known_modes();
   for (const char* mode : {"lio", "fusion", "literal", "hard"}) {
