@@ -132,6 +132,7 @@ TEST(WrongFixRow, tells_the_worst_error_and_how_many_were_used) {
   judgements[at_s(40.0)].moves = judgements[at_s(40.2)].moves = {false, true, false};  // reopened
   EXPECT_EQ(closing().value, 3.0);
   EXPECT_FALSE(closing().is_met());
+  EXPECT_NEAR(named(score("campus+wrong_fix", drive), "last one used").value, 10.2, kRounding);
 }
 
 TEST(HeightRow, allows_the_height_its_share_of_the_way_since_the_fault_began) {
