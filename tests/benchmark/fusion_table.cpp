@@ -181,7 +181,10 @@ void run(const Options& options) {
   for (const Row& row : all) {
     print(scores.print_words(row));
   }
-  print("\n" + scores.print_ratios(options.modes.back()) + "\n" + scores.print_summary());
+  if (options.modes.size() > 1) {
+    print("\n" + scores.print_ratios(options.modes.back()));
+  }
+  print("\n" + scores.print_summary());
 }
 
 }  // namespace
