@@ -39,6 +39,31 @@ Step largest_step(const Trajectory& fused, const Trajectory& lio) {
   return largest;
 }
 
+Step largest_step_over(const Trajectory& fused, const Trajectory& odom, Nanoseconds interval_ns) {
+  Step largest;
+  largest.relative_to_lio = true;
+  std::vector<std::optional<Pose>> odom_at;
+  odom_at.reserve(fused.size());
+  for (const auto& pose : fused) {
+    odom_at.push_back(pose_at(odom, pose.stamp_ns));
+  }
+  std::size_t to = 0;
+  for (std::size_t from = 0; from < fused.size(); ++from) {
+    while (to < fused.size() && fused[to].stamp_ns - fused[from].stamp_ns < interval_ns) {
+      ++to;
+    }
+    if (to == fused.size()) {
+      break;
+    }
+    const bool near = fused[to].stamp_ns - fused[from].stamp_ns < 2 * interval_ns;
+    if (near && odom_at[from] && odom_at[to]) {
+      const Pose T_map_odom = fused[from].pose * odom_at[from]->inverse();
+      keep_larger(largest, T_map_odom * *odom_at[to], fused[to]);
+    }
+  }
+  return largest;
+}
+
 Step largest_step(const Trajectory& trajectory) {
   Step largest;
   for (std::size_t i = 1; i < trajectory.size(); ++i) {
@@ -72,10 +97,14 @@ std::vector<OutageError> outage_errors(const std::vector<PosePair>& pairs,
   for (const auto& window : windows) {
     auto& result = errors.emplace_back();
     result.window = window;
+    std::optional<Eigen::Vector3d> last_m;  // on the reference
     for (const auto& pair : pairs) {
       if (!is_inside({window}, pair.stamp_ns)) {
         continue;
       }
+      const double moved_m = last_m ? (pair.reference.p - *last_m).norm() : 0.0;
+      result.distance_m = last_m ? result.distance_m + moved_m : 0.0;
+      last_m = pair.reference.p;
       const double error_m = (pair.estimate.p - pair.reference.p).norm();
       result.begin_m = result.pairs == 0 ? error_m : result.begin_m;
       result.max_m = result.pairs == 0 ? error_m : std::max(result.max_m, error_m);

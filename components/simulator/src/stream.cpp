@@ -95,9 +95,7 @@ class Stream final : public ScenarioReader {
         lidar_(scenario.lidar, scenario.robot.T_base_lidar(), seed),
         faults_(scenario.faults, scenario.start_ns(), seed),
         imu_epochs_(scenario.start_ns(), scenario.imu.rate_hz, drive_->last_ns()),
-        fix_epochs_(scenario.start_ns() + from_seconds(scenario.gnss.first_fix_s),
-                    scenario.gnss.rate_hz,
-                    drive_->last_ns()),
+        fix_epochs_(all_fix_epochs()),
         sweep_epochs_(scenario.start_ns() + from_seconds(scenario.lidar.first_sweep_s),
                       scenario.lidar.rate_hz,
                       options.lidar ? drive_->last_ns() - lidar_.sweep_ns() : 0) {
@@ -133,6 +131,24 @@ class Stream final : public ScenarioReader {
   std::shared_ptr<const Truth> truth() const override { return drive_; }
 
   const Scenario& scenario() const override { return scenario_; }
+
+  std::vector<FixTruth> true_fixes() const override {
+    std::vector<FixTruth> fixes;
+    for (Epochs epochs = all_fix_epochs(); !epochs.is_over();) {
+      GnssEpoch epoch;
+      epoch.stamp_ns = epochs.take();
+      epoch.antenna_map_m =
+          drive_->at(epoch.stamp_ns).T_map_base * scenario_.robot.antenna_position_base_m;
+      epoch.gnss_class = scenario_.gnss.gnss_class;
+      faults_.apply(epoch);
+      fixes.push_back({epoch.stamp_ns,
+                       epoch.antenna_map_m,
+                       epoch.lost || epoch.gnss_class == "none",
+                       epoch.gnss_class,
+                       epoch.extra_error_m});
+    }
+    return fixes;
+  }
 
   double progress() const override {
     const auto whole = static_cast<double>(drive_->last_ns() - drive_->first_ns());
@@ -193,6 +209,12 @@ class Stream final : public ScenarioReader {
       make_sweep();
     }
     return true;
+  }
+
+  Epochs all_fix_epochs() const {
+    return {scenario_.start_ns() + from_seconds(scenario_.gnss.first_fix_s),
+            scenario_.gnss.rate_hz,
+            drive_->last_ns()};
   }
 
   double sweep_delay_s() const {

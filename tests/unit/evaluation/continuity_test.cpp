@@ -79,6 +79,7 @@ TEST(OutageErrors, tell_begin_largest_and_end_of_each_window) {
   EXPECT_NEAR(errors[0].begin_m, 0.1, kRounding);
   EXPECT_NEAR(errors[0].max_m, 0.9, kRounding);
   EXPECT_NEAR(errors[0].end_m, 0.4, kRounding);
+  EXPECT_NEAR(errors[0].distance_m, 8.0, kRounding);  // nine poses, 1 m apart
   EXPECT_TRUE(std::isnan(errors[1].max_m));
 }
 

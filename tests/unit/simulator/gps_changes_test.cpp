@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
 // GPS faults as the overlays of the scenarios combine them.
+#include "trigpoint/geodesy/local_frame.hpp"
+
 #include "entries.hpp"
 #include "faults.hpp"
 #include <gtest/gtest.h>
@@ -21,11 +23,11 @@ double level_m(const GnssEpoch& fix) {
 TEST(GpsWander, goes_5_m_off_and_back_in_20_to_60_s_each_way_without_a_jump) {
   const Scenario scenario = load_scenario("short+frozen_covariance");
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
-    double last_end_s = 45.0;
+    double last_end_s = 60.0;
     double before_m = 0.0;
     bool out = true;
     int ways = 0;
-    for (double t_s = 45.0; t_s < 500.0; t_s += kPeriod_s) {
+    for (double t_s = 60.0; t_s < 515.0; t_s += kPeriod_s) {
       const GnssEpoch fix = fix_at(scenario, t_s, seed);
       const double now_m = level_m(fix);
       ASSERT_LE(now_m, 5.0 + 1e-9);
@@ -44,7 +46,7 @@ TEST(GpsWander, goes_5_m_off_and_back_in_20_to_60_s_each_way_without_a_jump) {
     }
     EXPECT_GE(ways, 7) << seed;
   }
-  EXPECT_EQ(level_m(fix_at(scenario, 44.9)), 0.0);
+  EXPECT_EQ(level_m(fix_at(scenario, 59.9)), 0.0);
 }
 
 TEST(GpsWrongFix, is_2_to_8_m_off_for_10_to_40_s_and_right_in_between) {
@@ -66,14 +68,14 @@ TEST(GpsWrongFix, is_2_to_8_m_off_for_10_to_40_s_and_right_in_between) {
         continue;
       }
       const double length_s = t_s - since_s;
-      ASSERT_GT(length_s, (size_m > 0.0 ? 10.0 : 30.0) - 2.0 * kStep_s);
-      ASSERT_LT(length_s, (size_m > 0.0 ? 40.0 : 90.0) + 2.0 * kStep_s);
+      ASSERT_GT(length_s, (size_m > 0.0 ? 10.0 : 15.0) - 2.0 * kStep_s);
+      ASSERT_LT(length_s, (size_m > 0.0 ? 40.0 : 45.0) + 2.0 * kStep_s);
       size_m = now_m;
       since_s = t_s;
     }
   }
-  // Means of 25 s wrong and 60 s right; about 350 of both, so 5 % is five standard deviations.
-  EXPECT_NEAR(wrong_s / (wrong_s + right_s), 25.0 / 85.0, 0.05 * 25.0 / 85.0 + 0.02);
+  // Means of 25 s wrong and 30 s right; about 540 of both, so 5 % is five standard deviations.
+  EXPECT_NEAR(wrong_s / (wrong_s + right_s), 25.0 / 55.0, 0.05 * 25.0 / 55.0 + 0.02);
 }
 
 TEST(GpsInflate, admits_its_share_of_what_other_faults_added) {
@@ -131,6 +133,35 @@ TEST(GpsChanges, deliver_the_same_fixes_late_shuffled_and_again) {
     ASSERT_NE(same, sorted.end());
     EXPECT_EQ(same->latitude_deg, fix.latitude_deg);
   }
+}
+
+TEST(TrueFixes, tell_what_was_lost_and_by_how_much_the_others_are_off) {
+  constexpr double kNoise_m = 0.15;  // six sigmas of a fixed solution's height
+  const Scenario scenario = load_scenario("campus+wrong_fix");
+  const auto reader = open_scenario(scenario, 1, std::nullopt, {false});
+  const auto truths = reader->true_fixes();
+  const auto messages = messages_of<GnssFix>(all_of(*reader));
+  const geodesy::LocalFrame frame(scenario.datum);
+  EXPECT_EQ(truths.size(), reader->true_fixes().size());
+  std::size_t delivered = 0;
+  bool any_wrong = false;
+  for (const FixTruth& truth : truths) {
+    const auto message = std::find_if(messages.begin(), messages.end(), [&](const GnssFix& fix) {
+      return fix.stamp_ns == truth.stamp_ns;
+    });
+    ASSERT_EQ(message == messages.end(), truth.lost);
+    if (truth.lost) {
+      EXPECT_NEAR(seconds(scenario, truth.stamp_ns), 45.0, 10.1);
+      continue;
+    }
+    ++delivered;
+    any_wrong = any_wrong || truth.fault_error_enu_m.norm() > 2.0;
+    const auto place =
+        frame.to_map({message->latitude_deg, message->longitude_deg, message->altitude_m});
+    ASSERT_LT((*place - truth.antenna_map_m - truth.fault_error_enu_m).norm(), kNoise_m);
+  }
+  EXPECT_EQ(delivered, messages.size());
+  EXPECT_TRUE(any_wrong);
 }
 
 TEST(GpsChanges, bring_the_first_fix_after_300_m) {

@@ -22,6 +22,12 @@ struct Step {
 /// the change of what is published minus the change of odom over the same interval, at base_link.
 Step largest_step(const Trajectory& fused, const Trajectory& lio);
 
+/// The same over `interval_ns` instead of between consecutive poses: from each pose to the first
+/// one that is no less than the interval later (and less than twice of it). The frames are those of
+/// the earlier pose, so both trajectories need poses at the same rate, as fusion/odometry and
+/// lio/odometry_imu_rate have.
+Step largest_step_over(const Trajectory& fused, const Trajectory& odom, Nanoseconds interval_ns);
+
 /// Largest plain change of position between consecutive poses.
 Step largest_step(const Trajectory& trajectory);
 
@@ -43,7 +49,8 @@ struct OutageError {
   std::size_t pairs{0};
   double begin_m{kNaN};  ///< position error at the first pair inside
   double max_m{kNaN};
-  double end_m{kNaN};  ///< at the last pair inside
+  double end_m{kNaN};       ///< at the last pair inside
+  double distance_m{kNaN};  ///< along the reference, from the first to the last pair inside
 };
 
 /// One per window, in order; NaN where no pair lies inside.

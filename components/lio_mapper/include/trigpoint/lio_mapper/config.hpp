@@ -97,8 +97,8 @@ struct LocalMapConfig {
 
 /// How fast odom drifts away from the truth: random walk of T_map_odom per metre driven.
 struct DriftConfig {
-  double position_sigma_m_sqrtm{0.02};
-  double yaw_sigma_rad_sqrtm{3.5e-4};
+  double position_sigma_m_sqrtm{0.01};
+  double yaw_sigma_rad_sqrtm{1.5e-4};
   double tilt_sigma_rad_sqrtm{1e-4};
   /// Share of the pose's covariance relative to the local map that the map inherits per metre.
   double map_renewal_per_m{0.0};

@@ -69,11 +69,23 @@ struct StreamOptions {
   std::function<void(const MovingSweep&)> on_moving{};
 };
 
+/// Truth about one fix, for evaluation only: what the faults did to it. The noise of its class
+/// comes on top; frozen messages and garbage are not told apart from right ones.
+struct FixTruth {
+  Nanoseconds stamp_ns{0};  ///< true time of the measurement
+  Eigen::Vector3d antenna_map_m{Eigen::Vector3d::Zero()};
+  bool lost{false};        ///< no message, or one without a position
+  std::string gnss_class;  ///< fixed, float, code, sbas, none
+  Eigen::Vector3d fault_error_enu_m{Eigen::Vector3d::Zero()};
+};
+
 /// A LogReader that makes its entries while it is read.
 class ScenarioReader : public recording::LogReader {
  public:
   virtual std::shared_ptr<const Truth> truth() const = 0;
   virtual const Scenario& scenario() const = 0;
+  /// Of every epoch of the receiver, lost ones too, in order of time; at any moment of the reading.
+  virtual std::vector<FixTruth> true_fixes() const = 0;
   /// Writes the truth and gives its path to truth_file() from now on. In a scenario with traffic
   /// also moving_objects.txt and, while it is read, moving_points.txt beside it.
   virtual void write_truth(const std::string& path) = 0;
