@@ -79,8 +79,8 @@ void describe(SmoothConfig& config, ConfigFields& fields) {
                 kPositive);
   fields.number("lio_drift_share",
                 config.lio_drift_share,
-                "LIO's drift besides the random walk of alignment.lio_drift_m_per_sqrt_m: one "
-                "sigma, as a share of the distance",
+                "LIO's drift on long ways, where it is more than the random walk of "
+                "alignment.lio_drift_m_per_sqrt_m: one sigma, as a share of the distance",
                 kNotNegative);
   fields.number("lio_yaw_drift_rad_per_sqrt_m",
                 config.lio_yaw_drift_rad_per_sqrt_m,

@@ -68,7 +68,10 @@ void FusionGate::Impl::judge_values(const AcceptedFix& fix,
   const AxisChoices choices = choose_smoothly(outcome);
   smooth_choices = choices;
   if (any_fused(choices) || outcome.trusted[0]) {
-    send_rows(fix, choices, out);
+    AcceptedFix weighted = fix;
+    weighted.covariance_map_m2.diagonal() +=
+        (monitor.scatter_map_m2(*lio) - fix.covariance_map_m2.diagonal()).cwiseMax(0.0);
+    send_rows(weighted, choices, out);
     return;
   }
   const Refusal& why = monitor.trust(Part::kLevel).reason();
@@ -133,12 +136,15 @@ bool FusionGate::Impl::is_replacement_awaited(Output& out) {
 }
 
 AxisChoices FusionGate::Impl::choose_smoothly(const MonitorOutcome& outcome) {
-  const Eigen::Vector3d variance_m2 = gps_variance_m2();
+  const Eigen::Vector3d reported_m2 = gps_variance_m2();
+  const Eigen::Vector3d scatter_m2 = monitor.scatter_map_m2(*lio);
   AxisChoices choices;
   for (int axis = 0; axis < 3; ++axis) {
     const auto k = static_cast<std::size_t>(axis);
     AxisChoice& choice = choices[k];
-    choice = choose_trusted(axis, variance_m2[axis]);
+    const bool scatters = scatter_m2[axis] > reported_m2[axis];
+    choice = choose_trusted(axis, scatters ? scatter_m2[axis] : reported_m2[axis]);
+    choice.reason += scatters ? ", measured against LIO" : "";
     sigma_passes[k] = choice.decision == AxisDecision::kFused;
     if (!outcome.trusted[index_of(part_of(axis))]) {
       choice.decision = AxisDecision::kLio;

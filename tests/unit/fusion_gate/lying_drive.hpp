@@ -35,7 +35,7 @@ struct LyingDriveSettings {
   std::function<bool(double)> is_blind;              ///< LIO along odom's x; may be empty: never
   double claimed_sigma_m{0.01};                      ///< horizontally; twice that in height
   double lio_walk_m_per_sqrt_m{0.007};
-  double lio_scale{0.0005};  ///< LIO's way is longer by this share
+  double lio_scale{0.0005};                             ///< LIO's way is longer by this share
   Eigen::Vector3d lio_jump_m{Eigen::Vector3d::Zero()};  ///< of odom against map during an outage
   double lio_jump_at_s{1e9};
   YawPose T_map_odom{2.0, {30.0, -10.0, 5.0}};
@@ -101,8 +101,8 @@ class LyingDrive {
     double result = 0.0;
     for (const DriveSample& sample : samples) {
       if (sample.at_s >= from_s && sample.at_s <= to_s) {
-        result = std::max(result,
-                          sample.error_m.segment(first_axis, last_axis - first_axis + 1).norm());
+        result =
+            std::max(result, sample.error_m.segment(first_axis, last_axis - first_axis + 1).norm());
       }
     }
     return result;
@@ -193,9 +193,7 @@ class LyingDrive {
 
   Pose T_map_base() const { return {from_yaw(heading_rad_), p_map_m_}; }
 
-  Pose T_odom_base() const {
-    return {from_yaw(heading_rad_ - s_.T_map_odom.yaw_rad), p_odom_m_};
-  }
+  Pose T_odom_base() const { return {from_yaw(heading_rad_ - s_.T_map_odom.yaw_rad), p_odom_m_}; }
 
   Eigen::Vector3d claimed_m() const {
     return {s_.claimed_sigma_m, s_.claimed_sigma_m, 2.0 * s_.claimed_sigma_m};
@@ -251,8 +249,7 @@ class LyingDrive {
     odometry.child_frame_id = "base_link";
     odometry.T_frame_child = T_map_base();
     odometry.linear_mps = {s_.speed_mps, 0.0, 0.0};
-    odometry.pose_covariance.topLeftCorner<3, 3>() =
-        (2.0 * claimed_m()).cwiseAbs2().asDiagonal();
+    odometry.pose_covariance.topLeftCorner<3, 3>() = (2.0 * claimed_m()).cwiseAbs2().asDiagonal();
     keep(gate_.on_gps_odometry(odometry, "gps"));
   }
 

@@ -27,8 +27,8 @@ double size_of(const Difference& difference, Part part);
 /// The largest length along the difference that `sigmas` permit.
 double permitted_m(const Difference& difference, Part part, double sigmas);
 
-/// What LIO may have drifted between two moments, axes of odom: random walk, a share of the
-/// distance, and the whole of the distance driven blind.
+/// What LIO may have drifted between two moments, axes of odom: the larger of a random
+/// walk and a share of the distance, and the whole of the distance driven blind.
 Eigen::Vector3d lio_drift_variance_m2(const Eigen::Vector3d& blind_m,
                                       double distance_m,
                                       const Config& config);

@@ -7,6 +7,8 @@
 #include "sentence.hpp"
 
 #include <algorithm>
+#include <numeric>
+#include <vector>
 
 namespace trigpoint::fusion_gate {
 
@@ -15,6 +17,8 @@ namespace {
 constexpr std::array<double, 3> kWindows_s{2.0, 10.0, 30.0};
 constexpr double kWindowTolerance = 1.5;  // the reference is at most this much older
 constexpr Nanoseconds kMemory_ns = 50 * kNanosecondsPerSecond;
+constexpr double kScatterWindow_s = 30.0;
+constexpr std::size_t kScatterFixes = 10;
 constexpr double kUnbrokenGap_s = 2.0;  // a longer silence confirms nothing
 // An alignment that was confirmed is given up only for fixes that agree against it for much longer.
 constexpr double kLongContradiction_s = 120.0;
@@ -53,6 +57,38 @@ Eigen::Vector3d FixMonitor::blind_variance_map_m2(const LioStatus& lio) const {
   }
   const Eigen::Matrix3d R_map_odom = lio.T_map_odom.pose().q.toRotationMatrix();
   return R_map_odom.cwiseAbs2() * since_odom_m.cwiseAbs2();
+}
+
+Eigen::Vector3d FixMonitor::scatter_map_m2(const LioStatus& lio) const {
+  const Eigen::Matrix3d R_map_odom = lio.T_map_odom.pose().q.toRotationMatrix();
+  Eigen::Vector3d result = Eigen::Vector3d::Zero();
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::size_t part = index_of(axis < 2 ? Part::kLevel : Part::kHeight);
+    std::vector<double> offsets_m;
+    const Sighting* first = nullptr;
+    const Sighting* last = nullptr;
+    for (const Sighting& s : sightings_) {
+      if (s.used[part] && to_seconds(sightings_.back().stamp_ns - s.stamp_ns) <= kScatterWindow_s) {
+        first = first == nullptr ? &s : first;
+        last = &s;
+        offsets_m.push_back(s.gps_map_m[axis] - R_map_odom.row(axis).dot(s.lio_odom_m));
+      }
+    }
+    if (offsets_m.size() < kScatterFixes || (last->blind_m - first->blind_m).norm() > 0.0) {
+      continue;
+    }
+    const auto n = static_cast<double>(offsets_m.size());
+    const double mean_m = std::accumulate(offsets_m.begin(), offsets_m.end(), 0.0) / n;
+    double sum_m2 = 0.0;
+    for (const double offset_m : offsets_m) {
+      sum_m2 += (offset_m - mean_m) * (offset_m - mean_m);
+    }
+    // A random walk over the whole way d has a variance of q d / 6 about its own mean.
+    const double drift_m2 =
+        compare_displacement(*first, *last, lio, config_).covariance_m2(axis, axis) / 6.0;
+    result[axis] = std::max(0.0, sum_m2 / (n - 1.0) - drift_m2);
+  }
+  return result;
 }
 
 Sighting FixMonitor::sighting_of(const Witness& witness) const {

@@ -34,8 +34,8 @@ struct AlignmentConfig {
 /// What mode smooth asks beyond Algorithm I (README, "Mode smooth").
 struct SmoothConfig {
   double leave_factor{1.25};      ///< an open axis closes above this times its threshold
-  double leave_sigmas{3.3};       ///< a trusted fix is doubted beyond
-  double enter_sigmas{2.6};       ///< a doubted one is trusted again within
+  double leave_sigmas{3.0};       ///< a trusted fix is doubted beyond
+  double enter_sigmas{2.5};       ///< a doubted one is trusted again within
   double raw_sigma_scale{2.0};    ///< receivers are optimistic
   double lio_drift_share{0.003};  ///< of the distance, one sigma; beside the random walk
   double lio_yaw_drift_rad_per_sqrt_m{0.00035};
