@@ -26,6 +26,8 @@
 
 namespace trigpoint::fusion_gate {
 
+inline constexpr const char* kCoasting = "; LIO is blind along it: coasting";
+
 /// The gate's state and its flow; one file a theme: gate_gps (sources, verdicts), gate_alignment
 /// (pairs, rows, LIO's epochs), gate_smooth (mode smooth), gate_output (map and status).
 struct FusionGate::Impl {
@@ -55,7 +57,7 @@ struct FusionGate::Impl {
   void go_back(const MonitorOutcome& outcome, const Witness& witness, Output& out);
   void replace(const Witness& witness, const Alignment& alignment, Output& out);
   bool is_replacement_awaited(Output& out);
-  AxisChoices choose_smoothly(const MonitorOutcome& outcome);
+  AxisChoices choose_smoothly() const;
   AxisChoice choose_trusted(int axis, double variance_m2) const;
   void tell_changes(const MonitorOutcome& outcome, Output& out) const;
   std::optional<Alignment> best_alignment() const;
@@ -74,12 +76,13 @@ struct FusionGate::Impl {
   void publish_lio(const Odometry& odometry, Output& out);
   void publish_gps(Output& out);
   void publish(const Odometry& odometry, const Pose& unchanged, Output& out);
+  bool has_odom_jumped(const Odometry& odometry);
   Odometry with_covariance_in_local_map(const Odometry& odometry) const;
   Pose as_predicted(Nanoseconds stamp_ns, const Pose& otherwise) const;
 
   // --- status
   FusionStatus status() const;
-  AxisStatus axis_status(const AxisChoice& choice) const;
+  AxisStatus axis_status(std::size_t axis, const AxisChoice& choice) const;
   std::optional<std::string> missing_fix() const;
   void finish(Output& out, bool status_wanted);
 
@@ -129,7 +132,6 @@ struct FusionGate::Impl {
   HandOver hand_over;
   std::deque<AcceptedFix> raw_fixes;  // the newest, in map
   std::array<bool, 3> sigma_passes{true, true, true};
-  std::optional<AxisChoices> smooth_choices;  // of the newest fix
   std::optional<AwaitedReplacement> awaited;
 
   // --- what fusion/odometry rested on last
@@ -137,6 +139,8 @@ struct FusionGate::Impl {
   std::optional<Odometry> last_raw;
   std::optional<Carrier> last_carrier;
   std::uint32_t last_epoch{0};
+  std::optional<Odometry> last_odom;
+  std::optional<Nanoseconds> odom_jumped_at_status_ns;
   YawPose last_T_map_odom;
   std::optional<PoseCovariance> last_scan_covariance;
 };

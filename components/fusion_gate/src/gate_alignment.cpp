@@ -154,8 +154,8 @@ void FusionGate::Impl::begin_epoch(const LioStatus& next, Output& out) {
   pending.clear();
   monitor.begin_anew();
   placements.clear();
-  smooth_choices.reset();
   awaited.reset();
+  last_odom.reset();
   last_imu_rate_ns.reset();
   tell(out,
        Severity::kWarning,

@@ -14,6 +14,7 @@ namespace trigpoint::fusion_gate {
 namespace {
 
 constexpr double kDefaultFixInterval_s = 1.0;
+constexpr double kHighestSpeed_mps = 60.0;
 constexpr double kGpsStep_m = 0.5;  // a GPS filter was set anew: more than corrections at 5 Hz move
 
 }  // namespace
@@ -77,8 +78,27 @@ Odometry FusionGate::Impl::with_covariance_in_local_map(const Odometry& odometry
   return result;
 }
 
+/// A new odom epoch or a found track shows in the odometry before lio/status tells of it: such a
+/// pose must not meet the old T_map_odom.
+bool FusionGate::Impl::has_odom_jumped(const Odometry& odometry) {
+  if (last_odom && !odom_jumped_at_status_ns) {
+    const double dt_s = std::abs(to_seconds(odometry.stamp_ns - last_odom->stamp_ns));
+    const double moved_m = (odometry.T_frame_child.p - last_odom->T_frame_child.p).norm();
+    if (moved_m > kHighestSpeed_mps * dt_s + kGpsStep_m) {
+      odom_jumped_at_status_ns = lio->stamp_ns;
+    }
+  }
+  if (odom_jumped_at_status_ns && lio->stamp_ns > *odom_jumped_at_status_ns) {
+    odom_jumped_at_status_ns.reset();
+  }
+  if (!odom_jumped_at_status_ns) {
+    last_odom = odometry;
+  }
+  return odom_jumped_at_status_ns.has_value();
+}
+
 void FusionGate::Impl::publish_lio(const Odometry& odometry, Output& out) {
-  if (!lio_carries()) {
+  if (!lio_carries() || has_odom_jumped(odometry)) {
     return;
   }
   const Odometry in_map =
@@ -141,14 +161,16 @@ std::optional<std::string> FusionGate::Impl::missing_fix() const {
   return sentence("no accepted fix for %.1f s", age_s);
 }
 
-AxisStatus FusionGate::Impl::axis_status(const AxisChoice& choice) const {
+AxisStatus FusionGate::Impl::axis_status(std::size_t index, const AxisChoice& choice) const {
   AxisStatus axis{AxisSource::kNone, choice.sigma_m, choice.threshold_m, choice.reason};
   if (lio_carries()) {
     axis.source = choice.decision == AxisDecision::kFused ? AxisSource::kFused : AxisSource::kLio;
     const std::optional<std::string> missing = missing_fix();
     if (missing && mode != Mode::kLio) {
       axis.source = AxisSource::kLio;
-      axis.reason = *missing + ", " + choice.reason;
+      const bool coasts = mode == Mode::kSmooth && choice.decision == AxisDecision::kFused &&
+                          monitor.is_blind(*lio, static_cast<int>(index));
+      axis.reason = *missing + ", " + choice.reason + (coasts ? kCoasting : "");
     }
   } else if (gps_carries() && gps_in_map()) {
     axis.source = AxisSource::kGps;
@@ -164,13 +186,12 @@ FusionStatus FusionGate::Impl::status() const {
   FusionStatus result;
   result.stamp_ns = now_ns;
   result.mode = config.mode;
-  const AxisChoices choices = aligned() && smooth_choices
-                                  ? *smooth_choices
+  const AxisChoices choices = aligned() && mode == Mode::kSmooth
+                                  ? choose_smoothly()
                                   : choose_axes(mode, gps_variance_m2(), threshold_m);
-  std::transform(
-      choices.begin(), choices.end(), result.axes.begin(), [this](const AxisChoice& choice) {
-        return axis_status(choice);
-      });
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    result.axes[axis] = axis_status(axis, choices[axis]);
+  }
   result.aligned = aligned();
   if (const std::optional<Alignment> best = best_alignment()) {
     result.T_map_odom = best->T_map_odom;

@@ -56,7 +56,6 @@ void FusionGate::Impl::judge_values(const AcceptedFix& fix,
     monitor.begin_anew();
     monitor.on_alignment(witness);
     placements.clear();
-    smooth_choices.reset();
     verdicts.record(fix.stamp_ns, true, "alignment", "carries a new alignment");
     tell(out,
          Severity::kWarning,
@@ -65,8 +64,10 @@ void FusionGate::Impl::judge_values(const AcceptedFix& fix,
     return;
   }
   go_back(outcome, witness, out);
-  const AxisChoices choices = choose_smoothly(outcome);
-  smooth_choices = choices;
+  const AxisChoices choices = choose_smoothly();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    sigma_passes[axis] = choices[axis].sigma_m <= choices[axis].threshold_m;
+  }
   if (any_fused(choices) || outcome.trusted[0]) {
     AcceptedFix weighted = fix;
     weighted.covariance_map_m2.diagonal() +=
@@ -135,25 +136,25 @@ bool FusionGate::Impl::is_replacement_awaited(Output& out) {
   return false;
 }
 
-AxisChoices FusionGate::Impl::choose_smoothly(const MonitorOutcome& outcome) {
+/// As of now: sigmas grow between fixes.
+AxisChoices FusionGate::Impl::choose_smoothly() const {
   const Eigen::Vector3d reported_m2 = gps_variance_m2();
   const Eigen::Vector3d scatter_m2 = monitor.scatter_map_m2(*lio);
+  const Trust& level = monitor.trust(Part::kLevel);
   AxisChoices choices;
   for (int axis = 0; axis < 3; ++axis) {
-    const auto k = static_cast<std::size_t>(axis);
-    AxisChoice& choice = choices[k];
+    AxisChoice& choice = choices[static_cast<std::size_t>(axis)];
     const bool scatters = scatter_m2[axis] > reported_m2[axis];
     choice = choose_trusted(axis, scatters ? scatter_m2[axis] : reported_m2[axis]);
     choice.reason += scatters ? ", measured against LIO" : "";
-    sigma_passes[k] = choice.decision == AxisDecision::kFused;
-    if (!outcome.trusted[index_of(part_of(axis))]) {
+    const Trust& trust = level.trusted() ? monitor.trust(part_of(axis)) : level;
+    if (!trust.trusted()) {
       choice.decision = AxisDecision::kLio;
-      choice.reason = outcome.trusted[0] ? monitor.trust(Part::kHeight).reason().reason
-                                         : monitor.trust(Part::kLevel).reason().reason;
+      choice.reason = trust.reason().reason;
     }
     if (choice.decision == AxisDecision::kLio && monitor.is_blind(*lio, axis)) {
       choice.decision = AxisDecision::kCoast;
-      choice.reason += "; LIO is blind along it: coasting";
+      choice.reason += kCoasting;
     }
   }
   return choices;

@@ -83,7 +83,7 @@ class LyingDrive {
   std::vector<FusionStatus> statuses;
   std::vector<StateUpdate> updates;
   Events events;
-  std::map<double, std::array<bool, 3>> used;  ///< by the fix's time: axes that became rows
+  std::map<long long, std::array<bool, 3>> used;  ///< by the fix's tick: axes that became rows
 
   double rms(int first_axis, int last_axis, double from_s = 0.0) const {
     double sum = 0.0;
@@ -135,10 +135,11 @@ class LyingDrive {
   double share_used(std::size_t axis, double from_s, double to_s) const {
     double all = 0.0;
     double taken = 0.0;
-    for (const auto& [at_s, axes] : fixes_) {
+    for (const long long tick : fixes_) {
+      const double at_s = static_cast<double>(tick) * kTick_s;
       if (at_s >= from_s && at_s < to_s) {
         all += 1.0;
-        const auto found = used.find(at_s);
+        const auto found = used.find(tick);
         taken += found != used.end() && found->second[axis] ? 1.0 : 0.0;
       }
     }
@@ -230,7 +231,7 @@ class LyingDrive {
     status.accepted_covariance_map_m2 = (2.0 * claimed_m()).cwiseAbs2().asDiagonal();
     status.fixes_received = ++fixes_received_;
     status.fixes_accepted = fixes_received_;
-    fixes_[now_s_] = antenna_m;
+    fixes_.push_back(std::llround(now_s_ / kTick_s));
     waiting_.push_back({now_s_ + s_.fix_latency_s, raw, status});
   }
 
@@ -327,7 +328,7 @@ class LyingDrive {
     T_.p += step.tail<3>();
     P_ = (P_ - K * H * P_).eval();
     P_ = (0.5 * (P_ + P_.transpose())).eval();
-    used[std::round(at_s * 100.0) / 100.0] = axes;
+    used[std::llround(at_s / kTick_s)] = axes;
   }
 
   void keep(const Output& out) {
@@ -372,7 +373,7 @@ class LyingDrive {
   Eigen::Vector3d p_odom_m_{Eigen::Vector3d::Zero()};
   Eigen::Vector3d slow_m_{Eigen::Vector3d::Zero()};
   std::map<long long, Poses> poses_;
-  std::map<double, Eigen::Vector3d> fixes_;
+  std::vector<long long> fixes_;  // ticks
   std::deque<Waiting> waiting_;
   std::uint64_t fixes_received_{0};
   bool aligned_{false};
