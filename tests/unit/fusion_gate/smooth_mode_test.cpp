@@ -122,6 +122,18 @@ TEST_P(SmoothMode, aligns_anew_within_20_m_after_a_wrong_fix_at_the_start) {
   EXPECT_LT(drive.largest_step_m(), kLargestStep_m);
 }
 
+TEST_P(SmoothMode, keeps_a_young_alignment_that_fixes_confirmed_after_an_outage) {
+  settings.duration_s = 80.0;
+  settings.has_fix = [](double at_s) { return at_s < 15.0 || at_s >= 25.0; };
+  settings.lie_enu_m = [this](double at_s) {
+    return Eigen::Vector3d((at_s >= 32.0 && at_s < 60.0 ? 3.0 : 0.0) * aside);
+  };
+  LyingDrive drive(settings);
+  drive.run();
+  EXPECT_FALSE(drive.has_event("realigned"));
+  EXPECT_LT(drive.worst(0, 2), 0.3);
+}
+
 TEST_P(SmoothMode, is_back_in_5_s_when_gps_returns_after_an_outage_with_half_a_percent_of_drift) {
   settings.speed_mps = 1.2;
   settings.duration_s = 190.0;

@@ -19,6 +19,7 @@ constexpr double kWindowTolerance = 1.5;  // the reference is at most this much 
 constexpr Nanoseconds kMemory_ns = 50 * kNanosecondsPerSecond;
 constexpr double kScatterWindow_s = 30.0;
 constexpr std::size_t kScatterFixes = 10;
+constexpr double kNewSolution_s = 5.0;  // after such a silence the receiver began anew
 constexpr double kUnbrokenGap_s = 2.0;  // a longer silence confirms nothing
 // An alignment that was confirmed is given up only for fixes that agree against it for much longer.
 constexpr double kLongContradiction_s = 120.0;
@@ -217,6 +218,8 @@ MonitorOutcome FixMonitor::judge(const Witness& witness, const LioStatus& lio) {
   if (outcome.trusted[0] && last_trusted_[0]) {
     const double since_s = to_seconds(sighting.stamp_ns - last_trusted_[0]->stamp_ns);
     confirmed_s_ += since_s <= kUnbrokenGap_s ? std::max(0.0, since_s) : 0.0;
+    // A receiver that lost its solution does not find the same wrong one again.
+    confirmed_s_ += since_s > kNewSolution_s ? config_.smooth.probation_s : 0.0;
   }
   for (const Part part : kParts) {
     if (outcome.trusted[index_of(part)]) {
