@@ -7,7 +7,6 @@
 #include "downsample.hpp"
 #include "scan_matcher.hpp"
 #include "undistortion.hpp"
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
 #include <utility>
@@ -59,11 +58,6 @@ PointCloud transformed(const PointCloud& points, const Pose& T) {
   }
   return moved;
 }
-
-// Along an axis that scans hold worse than this, as in a tunnel, the map slides unnoticed and by
-// nearly any share of the way; there T_map_odom must be able to follow GPS at once.
-constexpr double kBlindSigma_m = 0.03;
-constexpr double kSlide_m_sqrtm = 0.8;
 
 Matrix4d drift_noise(const DriftConfig& drift,
                      double distance_m,
@@ -153,26 +147,6 @@ void ScanFilter::add_drift(Prediction& prediction) {
   const Vector3d& p = prediction.state.T_odom_base.p;
   drift_covariance_ += drift_noise(config_.drift, moved_m, Matrix3d::Identity(), p);
   add_drift_noise(config_.drift, moved_m, prediction.state, aligned_, prediction.covariance);
-  add_slide_noise(moved_m, prediction);
-}
-
-void ScanFilter::add_slide_noise(double moved_m, Prediction& prediction) {
-  const Matrix3d held = prediction.covariance.block<3, 3>(error::kPosition, error::kPosition);
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> axes(held);
-  const Matrix3d R_map_odom = prediction.state.placement().pose().q.toRotationMatrix();
-  for (int i = 0; i < 3; ++i) {
-    if (axes.eigenvalues()[i] < kBlindSigma_m * kBlindSigma_m) {
-      continue;
-    }
-    const double slide_m2 = kSlide_m_sqrtm * kSlide_m_sqrtm * moved_m;
-    const Vector3d u_odom = axes.eigenvectors().col(i);
-    const Vector3d u_map = R_map_odom * u_odom;
-    drift_covariance_.bottomRightCorner<3, 3>() += slide_m2 * u_odom * u_odom.transpose();
-    if (aligned_) {
-      prediction.covariance.block<3, 3>(error::kPositionMapOdom, error::kPositionMapOdom) +=
-          slide_m2 * u_map * u_map.transpose();
-    }
-  }
 }
 
 UpdateResult ScanFilter::match(const Prediction& prediction,

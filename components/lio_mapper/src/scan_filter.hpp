@@ -124,7 +124,6 @@ class ScanFilter {
 
   Prediction predict(const Sweep& sweep, const ImuBuffer& imu) const;
   void add_drift(Prediction& prediction);
-  void add_slide_noise(double moved_m, Prediction& prediction);
   void begin(Stage stage) const;
   /// The prediction conditioned on the pose that a search found; false when it found none.
   bool search(const PoseSearch& look, const PointCloud& thinned_base, Prediction& prediction) const;

@@ -274,7 +274,7 @@ class LyingDrive {
     turn.tail<3>() = -Eigen::Vector3d::UnitZ().cross(T_.pose().q * p_odom_m_);
     P_ += 0.00035 * 0.00035 * moved_m * turn * turn.transpose();
     P_.bottomRightCorner<3, 3>().diagonal().array() += 0.02 * 0.02 * moved_m;
-    if (blind) {
+    if (blind) {  // which the real mapper does not do yet
       const Eigen::Vector3d along_m = T_.pose().q * Eigen::Vector3d::UnitX();
       P_.bottomRightCorner<3, 3>() += 0.6 * moved_m * along_m * along_m.transpose();
     }

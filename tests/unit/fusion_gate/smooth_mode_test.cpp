@@ -134,6 +134,18 @@ TEST_P(SmoothMode, keeps_a_young_alignment_that_fixes_confirmed_after_an_outage)
   EXPECT_LT(drive.worst(0, 2), 0.3);
 }
 
+TEST_P(SmoothMode, does_not_follow_a_wanderer_that_stands_still_while_the_alignment_is_young) {
+  settings.duration_s = 80.0;
+  settings.has_fix = [](double at_s) { return at_s < 20.0 || at_s >= 35.0; };
+  settings.lie_enu_m = [this](double at_s) {
+    return Eigen::Vector3d(5.0 * smooth_step((at_s - 25.0) / 25.0) * aside);
+  };
+  LyingDrive drive(settings);
+  drive.run();
+  EXPECT_FALSE(drive.has_event("realigned"));
+  EXPECT_LT(drive.worst(0, 2), 0.4);
+}
+
 TEST_P(SmoothMode, is_back_in_5_s_when_gps_returns_after_an_outage_with_half_a_percent_of_drift) {
   settings.speed_mps = 1.2;
   settings.duration_s = 190.0;

@@ -20,6 +20,7 @@ constexpr Nanoseconds kMemory_ns = 50 * kNanosecondsPerSecond;
 constexpr double kScatterWindow_s = 30.0;
 constexpr std::size_t kScatterFixes = 10;
 constexpr double kNewSolution_s = 5.0;  // after such a silence the receiver began anew
+constexpr double kJump_s = 1.0;
 constexpr double kUnbrokenGap_s = 2.0;  // a longer silence confirms nothing
 // An alignment that was confirmed is given up only for fixes that agree against it for much longer.
 constexpr double kLongContradiction_s = 120.0;
@@ -180,7 +181,7 @@ Tests FixMonitor::test(const Witness& witness,
 }
 
 /// Since when GPS has crept away unnoticed: the newest trusted fix that contradicts this one over a
-/// window. None when it jumped, because then nothing wrong was believed.
+/// window. None when it jumped or was away, because then nothing wrong was believed.
 std::optional<Nanoseconds> FixMonitor::taken_in_since(const Sighting& sighting,
                                                       const LioStatus& lio,
                                                       Part part) const {
@@ -188,7 +189,8 @@ std::optional<Nanoseconds> FixMonitor::taken_in_since(const Sighting& sighting,
     return before != nullptr && sigmas_of(compare_displacement(*before, sighting, lio, config_),
                                           part) > config_.smooth.enter_sigmas;
   };
-  if (contradicts(trusted_before(sighting.stamp_ns, 0.0, part))) {
+  const Sighting* newest = trusted_before(sighting.stamp_ns, 0.0, part);
+  if (newest == nullptr || contradicts(newest)) {
     return std::nullopt;
   }
   for (const double window_s : kWindows_s) {
@@ -271,7 +273,9 @@ std::optional<AlignmentSolution> FixMonitor::rival_of(const Sighting& sighting, 
               sighting.distance_m});
   const Sighting& first = doubt.stretch().front();
   const double agreed_s = to_seconds(sighting.stamp_ns - first.stamp_ns);
-  const bool on_probation = confirmed_s_ < config_.smooth.probation_s;
+  // Fixes that first moved unlike LIO are liars themselves; the end of a wrong fix is one jump.
+  const bool jumped = to_seconds(first.stamp_ns - doubt.since_ns()) <= kJump_s;
+  const bool on_probation = jumped && confirmed_s_ < config_.smooth.probation_s;
   const bool outlives = doubted == Part::kLevel && agreed_s > kLongContradiction_s &&
                         agreed_s > kLongerThanConfirmed * confirmed_s_;
   const bool is_long_enough = sighting.distance_m - first.distance_m >= config_.smooth.realign_m;

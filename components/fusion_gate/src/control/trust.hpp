@@ -34,6 +34,9 @@ class Trust {
 
   bool trusted() const { return !doubt_; }
 
+  /// Only while in doubt.
+  Nanoseconds since_ns() const { return doubt_.value_or(0); }
+
   /// Why it is doubted; empty code when it is trusted.
   const Refusal& reason() const { return reason_; }
 
