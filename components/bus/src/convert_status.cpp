@@ -67,13 +67,15 @@ trigpoint_msgs::msg::Alignment to_message(const Alignment& alignment) {
   message.odom_epoch(alignment.odom_epoch);
   message.T_map_odom(to_message(alignment.T_map_odom));
   message.covariance(row_major(alignment.covariance));
+  message.replaces(alignment.replaces);
   return message;
 }
 
 Alignment from_message(const trigpoint_msgs::msg::Alignment& message) {
   return {message.odom_epoch(),
           from_message(message.T_map_odom()),
-          from_row_major<4>(message.covariance())};
+          from_row_major<4>(message.covariance()),
+          message.replaces()};
 }
 
 trigpoint_msgs::msg::AxisStatus to_message(const AxisStatus& axis) {

@@ -222,7 +222,7 @@ void add_config_options(CLI::App& verb, InputOptions& options) {
                   options.config_files,
                   "YAML with the keys to change (trigpoint config prints all); may be repeated, "
                   "later files win");
-  verb.add_option("--mode", options.mode, "of the gate: lio, fusion, literal or hard");
+  verb.add_option("--mode", options.mode, "of the gate: lio, fusion, literal, hard or smooth");
 }
 
 void add_input_options(CLI::App& verb, InputOptions& options) {

@@ -7,6 +7,7 @@
 #include "session_data.hpp"
 #include "session_scores.hpp"
 
+#include <algorithm>
 #include <filesystem>
 #include <functional>
 
@@ -49,6 +50,20 @@ std::string print_pictures(const std::vector<std::string>& pictures) {
                             "trajectories.gp` draws anew.\n";
 }
 
+/// What the gate refused most fixes for, when it used none of them; empty when it used some.
+std::string refusal_of_all(const SessionData& data) {
+  if (data.gate.empty() || data.gate.back().fixes_seen == 0 || data.gate.back().fixes_used > 0) {
+    return "";
+  }
+  const auto& verdicts = data.gate.back().verdicts;
+  const auto most = std::max_element(
+      verdicts.begin(), verdicts.end(), [](auto& a, auto& b) { return a.count < b.count; });
+  return "None of " + std::to_string(data.gate.back().fixes_seen) + " fixes was used" +
+         (most == verdicts.end()
+              ? std::string(".")
+              : ", most often because: " + most->name + " (" + std::to_string(most->count) + ").");
+}
+
 /// Fixes that no alignment came of are a failure; without fixes nobody expects one.
 std::vector<std::string> find_failures(const SessionData& data, const Accounting& found) {
   std::vector<std::string> failures;
@@ -62,6 +77,9 @@ std::vector<std::string> find_failures(const SessionData& data, const Accounting
     failures.push_back("No alignment of odom with map was admitted although there were " +
                        std::to_string(data.fixes_fed()) +
                        " fixes: the map is not georeferenced reliably.");
+  }
+  if (const std::string refusal = refusal_of_all(data); !lio_only && !refusal.empty()) {
+    failures.push_back(refusal);
   }
   if (data.fused.empty() && !(lio_only && data.fixes_fed() == 0)) {
     failures.push_back(std::string(file::kFused) + " is empty: nothing was published in map.");

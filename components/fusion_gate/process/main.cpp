@@ -47,6 +47,7 @@ class Process {
         participant_(settings.bus, "fusion_gate", log_),
         updates_(participant_, topics::state_update),
         fused_(participant_, topics::fusion_odometry),
+        fused_raw_(participant_, topics::fusion_odometry_raw),
         status_(participant_, topics::fusion_status),
         selected_(participant_, topics::gps_selected),
         datum_(participant_, topics::datum),
@@ -152,6 +153,9 @@ class Process {
     if (output.selected) {
       selected_.publish(bus::to_message(*output.selected));
     }
+    if (output.fused_raw) {
+      fused_raw_.publish(bus::to_message(*output.fused_raw));
+    }
     if (output.fused) {
       fused_.publish(bus::to_message(*output.fused));
       keep([&] { session_->on_fused(*output.fused); });
@@ -207,6 +211,7 @@ class Process {
   bus::Participant participant_;
   bus::Publisher<trigpoint_msgs::msg::StateUpdate> updates_;
   bus::Publisher<nav_msgs::msg::Odometry> fused_;
+  bus::Publisher<nav_msgs::msg::Odometry> fused_raw_;
   bus::Publisher<trigpoint_msgs::msg::FusionStatus> status_;
   bus::Publisher<nav_msgs::msg::Odometry> selected_;
   bus::Publisher<sensor_msgs::msg::NavSatFix> datum_;

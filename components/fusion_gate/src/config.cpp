@@ -60,14 +60,69 @@ void describe(AlignmentConfig& config, ConfigFields& fields) {
                 kPositive);
 }
 
+void describe(SmoothConfig& config, ConfigFields& fields) {
+  fields.number("leave_factor",
+                config.leave_factor,
+                "an axis opens at its threshold and closes above this times it",
+                {1.0, 100.0});
+  fields.number("leave_sigmas",
+                config.leave_sigmas,
+                "a fix that is farther from what LIO and T_map_odom say is doubted",
+                kPositive);
+  fields.number("enter_sigmas",
+                config.enter_sigmas,
+                "doubted fixes must be nearer than this to be trusted again",
+                kPositive);
+  fields.number("raw_sigma_scale",
+                config.raw_sigma_scale,
+                "receivers are optimistic: sigma of a raw fix is multiplied by this",
+                kPositive);
+  fields.number("lio_drift_share",
+                config.lio_drift_share,
+                "LIO's drift on long ways, where it is more than the random walk of "
+                "alignment.lio_drift_m_per_sqrt_m: one sigma, as a share of the distance",
+                kNotNegative);
+  fields.number("lio_yaw_drift_rad_per_sqrt_m",
+                config.lio_yaw_drift_rad_per_sqrt_m,
+                "random walk of LIO's yaw with the distance",
+                kNotNegative);
+  fields.number("lio_blind_sigma_m",
+                config.lio_blind_sigma_m,
+                "along an axis whose sigma in lio/status is larger LIO may slide: there GPS is not "
+                "tested against it and carries the axis, also above the threshold",
+                kPositive);
+  fields.number("readmit_s",
+                config.readmit_s,
+                "doubted fixes are trusted again after they agreed with each other for as long as "
+                "they were in doubt, 1 s at least and this at most",
+                {1.0, 1e4});
+  fields.integer("readmit_fixes", config.readmit_fixes, "that must agree then", {2, 1000});
+  fields.number("probation_s",
+                config.probation_s,
+                "an alignment that fixes confirmed for less may rest on a wrong fix as a whole: "
+                "longer than wrong fixes last",
+                kNotNegative);
+  fields.number("realign_m",
+                config.realign_m,
+                "distance over which fixes must agree with each other against such an alignment",
+                kPositive);
+  fields.number("hand_over_mps",
+                config.hand_over_mps,
+                "fusion/odometry follows a change of T_map_odom at base_link no faster",
+                kPositive);
+  fields.number("hand_over_radps", config.hand_over_radps, "the same for attitude", kPositive);
+}
+
 }  // namespace
 
 void describe(Config& config, ConfigFields& fields) {
-  fields.choice("mode",
-                config.mode,
-                "lio: no GPS rows; fusion: every row; literal: the paper's assignment per axis; "
-                "hard: Algorithm I decides which rows enter",
-                {"lio", "fusion", "literal", "hard"});
+  fields.choice(
+      "mode",
+      config.mode,
+      "lio: no GPS rows; fusion: every row; literal: the paper's assignment per axis; "
+      "hard: Algorithm I decides which rows enter; smooth: joined by tests of the values, "
+      "and handed over without steps",
+      {"lio", "fusion", "literal", "hard", "smooth"});
   fields.vector3("threshold",
                  config.threshold,
                  "Algorithm I, axes east north up: above it LIO keeps the axis; m, or m^2 when "
@@ -123,6 +178,9 @@ void describe(Config& config, ConfigFields& fields) {
                 kPositive);
   fields.section("alignment", "how the first T_map_odom is found", [&](ConfigFields& section) {
     describe(config.alignment, section);
+  });
+  fields.section("smooth", "what mode smooth asks besides", [&](ConfigFields& section) {
+    describe(config.smooth, section);
   });
 }
 

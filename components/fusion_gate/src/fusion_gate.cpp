@@ -23,7 +23,10 @@ FusionGate::Impl::Impl(const Config& config_in, const RobotConfig& robot_in)
       sources(config_in),
       rows(config_in, robot_in.antenna_position_base_m),
       lio_poses(kLioBuffer_ns, from_seconds(config_in.alignment.max_interpolation_gap_s)),
-      window(config_in.alignment) {}
+      window(config_in.alignment),
+      monitor(config_in, robot_in.antenna_position_base_m),
+      placements(config_in),
+      hand_over(config_in.smooth.hand_over_mps, config_in.smooth.hand_over_radps) {}
 
 FusionGate::FusionGate(const Config& config, const RobotConfig& robot)
     : impl_(std::make_unique<Impl>(config, robot)) {}
@@ -71,6 +74,8 @@ Output FusionGate::on_datum(const Datum& datum) {
     return out;
   }
   impl_->window.clear();
+  impl_->monitor.begin_anew();
+  impl_->raw_fixes.clear();
   for (auto& [writer, source] : impl_->foreign_sources) {
     source.forget_alignment();
   }
@@ -90,6 +95,7 @@ Output FusionGate::on_lio_odometry(const Odometry& odometry) {
   }
   gate.advance(odometry.stamp_ns);
   gate.last_lio_ns = std::max(gate.last_lio_ns.value_or(odometry.stamp_ns), odometry.stamp_ns);
+  gate.last_scan_covariance = odometry.pose_covariance;
   gate.align_pending(out);
   const bool imu_rate_silent =
       !gate.last_imu_rate_ns ||

@@ -6,15 +6,19 @@
 #include "trigpoint/geodesy/local_frame.hpp"
 
 #include "alignment/alignment_window.hpp"
+#include "alignment/placement_history.hpp"
 #include "alignment/pose_buffer.hpp"
 #include "checks/accepted_fix.hpp"
 #include "checks/foreign_source.hpp"
 #include "checks/gps_sources.hpp"
 #include "checks/verdicts.hpp"
 #include "control/algorithm_one.hpp"
+#include "control/fix_monitor.hpp"
+#include "fusion/hand_over.hpp"
 #include "fusion/rows.hpp"
 
 #include <algorithm>
+#include <array>
 #include <deque>
 #include <map>
 #include <optional>
@@ -22,8 +26,10 @@
 
 namespace trigpoint::fusion_gate {
 
+inline constexpr const char* kCoasting = "; LIO is blind along it: coasting";
+
 /// The gate's state and its flow; one file a theme: gate_gps (sources, verdicts), gate_alignment
-/// (pairs, rows, LIO's epochs), gate_output (map and status).
+/// (pairs, rows, LIO's epochs), gate_smooth (mode smooth), gate_output (map and status).
 struct FusionGate::Impl {
   Impl(const Config& config_in, const RobotConfig& robot_in);
   // --- GPS in
@@ -42,6 +48,18 @@ struct FusionGate::Impl {
   void align_pending(Output& out);
   void add_pair(const AcceptedFix& fix, const PoseBuffer::Sample& at_fix, Output& out);
   void make_rows(const AcceptedFix& fix, Output& out);
+  void send_rows(const AcceptedFix& fix, const AxisChoices& choices, Output& out);
+
+  // --- mode smooth
+  void remember_raw(const AcceptedFix& fix);
+  Witness witness_of(const AcceptedFix& fix, const PoseBuffer::Sample& at_fix) const;
+  void judge_values(const AcceptedFix& fix, const PoseBuffer::Sample& at_fix, Output& out);
+  void go_back(const MonitorOutcome& outcome, const Witness& witness, Output& out);
+  void replace(const Witness& witness, const Alignment& alignment, Output& out);
+  bool is_replacement_awaited(Output& out);
+  AxisChoices choose_smoothly() const;
+  AxisChoice choose_trusted(int axis, double variance_m2) const;
+  void tell_changes(const MonitorOutcome& outcome, Output& out) const;
   std::optional<Alignment> best_alignment() const;
 
   bool aligned() const { return lio && lio->aligned; }
@@ -57,11 +75,14 @@ struct FusionGate::Impl {
   Eigen::Vector3d gps_variance_m2() const;
   void publish_lio(const Odometry& odometry, Output& out);
   void publish_gps(Output& out);
-  void publish(const Odometry& odometry, Output& out);
+  void publish(const Odometry& odometry, const Pose& unchanged, Output& out);
+  bool has_odom_jumped(const Odometry& odometry);
+  Odometry with_covariance_in_local_map(const Odometry& odometry) const;
+  Pose as_predicted(Nanoseconds stamp_ns, const Pose& otherwise) const;
 
   // --- status
   FusionStatus status() const;
-  AxisStatus axis_status(const AxisChoice& choice) const;
+  AxisStatus axis_status(std::size_t axis, const AxisChoice& choice) const;
   std::optional<std::string> missing_fix() const;
   void finish(Output& out, bool status_wanted);
 
@@ -97,6 +118,31 @@ struct FusionGate::Impl {
   std::deque<double> fix_intervals_s;
   std::uint64_t fixes_seen{0};
   bool verdict_changed{false};
+
+  // --- mode smooth
+  struct AwaitedReplacement {
+    Nanoseconds since_ns;
+    Eigen::Vector3d here_odom_m;
+    Eigen::Vector3d target_map_m;  // of here
+    double first_distance_m;       // from it, when it was sent
+  };
+
+  FixMonitor monitor;
+  PlacementHistory placements;
+  HandOver hand_over;
+  std::deque<AcceptedFix> raw_fixes;  // the newest, in map
+  std::array<bool, 3> sigma_passes{true, true, true};
+  std::optional<AwaitedReplacement> awaited;
+
+  // --- what fusion/odometry rested on last
+  enum class Carrier { kLio, kGps };
+  std::optional<Odometry> last_raw;
+  std::optional<Carrier> last_carrier;
+  std::uint32_t last_epoch{0};
+  std::optional<Odometry> last_odom;
+  std::optional<Nanoseconds> odom_jumped_at_status_ns;
+  YawPose last_T_map_odom;
+  std::optional<PoseCovariance> last_scan_covariance;
 };
 
 }  // namespace trigpoint::fusion_gate

@@ -23,13 +23,12 @@ void FusionGate::Impl::align_pending(Output& out) {
     }
     pending.pop_front();
     verdict_changed = true;
-    if (answer.coverage == PoseBuffer::Coverage::kCovered) {
-      add_pair(fix, answer.sample, out);
+    if (answer.coverage != PoseBuffer::Coverage::kCovered) {
+      verdicts.record(fix.stamp_ns, false, "no_lio_pose", "no LIO pose at the fix's stamp");
+    } else if (aligned()) {
+      judge_values(fix, answer.sample, out);
     } else {
-      verdicts.record(fix.stamp_ns,
-                      false,
-                      "no_lio_pose",
-                      "not aligned yet, and no LIO pose at the fix's stamp");
+      add_pair(fix, answer.sample, out);
     }
   }
 }
@@ -55,6 +54,7 @@ void FusionGate::Impl::add_pair(const AcceptedFix& fix,
   const Alignment alignment{
       lio ? lio->odom_epoch : 0, window.solution()->T_map_odom, window.solution()->covariance};
   out.state_updates.push_back(rows.make_alignment(fix, alignment));
+  monitor.on_alignment(witness_of(fix, at_fix));
   verdicts.record(fix.stamp_ns, true, "alignment", "carries the first alignment");
   if (!was_admitted) {
     tell(out,
@@ -73,6 +73,10 @@ void FusionGate::Impl::make_rows(const AcceptedFix& fix, Output& out) {
     verdicts.record(fix.stamp_ns, false, "mode_lio", "mode lio takes no GPS rows");
     return;
   }
+  send_rows(fix, choices, out);
+}
+
+void FusionGate::Impl::send_rows(const AcceptedFix& fix, const AxisChoices& choices, Output& out) {
   const bool used = any_fused(choices);
   out.state_updates.push_back(rows.make(fix, choices));
   std::string reason = used ? "rows:" : "no row:";
@@ -115,8 +119,21 @@ void FusionGate::Impl::take_lio_status(const LioStatus& next, Output& out) {
   const bool was_aligned = aligned();
   if (lio && lio->odom_epoch != next.odom_epoch) {
     begin_epoch(next, out);
+  } else if (lio && lio->reset.counter != next.reset.counter) {
+    monitor.on_odom_step();
   }
   lio = next;
+  monitor.on_lio_status(next, lio_poses.distance_m());
+  if (aligned()) {
+    placements.add(next, lio_poses.distance_m());
+  }
+  if (aligned() && mode == Mode::kSmooth) {
+    if (!was_aligned) {
+      window.clear();
+    }
+    align_pending(out);
+    return;
+  }
   if (aligned() && (!was_aligned || !pending.empty())) {
     window.clear();
     const std::deque<AcceptedFix> waiting = std::move(pending);
@@ -135,6 +152,10 @@ void FusionGate::Impl::begin_epoch(const LioStatus& next, Output& out) {
   }
   verdict_changed = verdict_changed || !pending.empty();
   pending.clear();
+  monitor.begin_anew();
+  placements.clear();
+  awaited.reset();
+  last_odom.reset();
   last_imu_rate_ns.reset();
   tell(out,
        Severity::kWarning,

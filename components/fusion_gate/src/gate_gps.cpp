@@ -132,7 +132,8 @@ void FusionGate::Impl::take_raw_fix(const GnssFix& fix, Output& out) {
       });
   const bool usable = frame && (fix.status == FixStatus::kFix || fix.status == FixStatus::kSbas ||
                                 fix.status == FixStatus::kGbas);
-  const auto position = wanted && usable ? frame->to_map(place) : std::nullopt;
+  const auto position =
+      (wanted || mode == Mode::kSmooth) && usable ? frame->to_map(place) : std::nullopt;
   if (!position) {
     if (wanted && !frame) {
       tell(out,
@@ -150,6 +151,9 @@ void FusionGate::Impl::take_raw_fix(const GnssFix& fix, Output& out) {
   const Eigen::Matrix3d covariance_m2 =
       known ? Eigen::Matrix3d(R_map_enu * fix.covariance_enu_m2 * R_map_enu.transpose())
             : Eigen::Matrix3d(Eigen::Matrix3d::Identity() * default_m2);
+  remember_raw({fix.stamp_ns,
+                *position,
+                covariance_m2 * config.smooth.raw_sigma_scale * config.smooth.raw_sigma_scale});
   for (auto& [writer, source] : foreign_sources) {
     const auto ready =
         source.on_fix({fix.stamp_ns, *position, floored(covariance_m2, config.min_sigma_m)});
@@ -192,11 +196,15 @@ void FusionGate::Impl::accept(const AcceptedFix& fix, Output& out) {
     fix_intervals_s.pop_front();
   }
   last_accepted_ns = std::max(last_accepted_ns.value_or(fix.stamp_ns), fix.stamp_ns);
-  if (aligned()) {
+  if (aligned() && mode != Mode::kSmooth) {
     make_rows(fix, out);
     return;
   }
-  pending.push_back(fix);
+  const auto later = std::upper_bound(
+      pending.begin(), pending.end(), fix, [](const AcceptedFix& a, const AcceptedFix& b) {
+        return a.stamp_ns < b.stamp_ns;
+      });
+  pending.insert(later, fix);
   if (pending.size() > kMaxPendingFixes) {
     verdicts.record(
         pending.front().stamp_ns, false, "no_lio_pose", "LIO never covered the fix's stamp");

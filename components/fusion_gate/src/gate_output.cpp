@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
+#include "trigpoint/base/so3.hpp"
+
 #include "fusion/fused_odometry.hpp"
 #include "gate.hpp"
 #include "sentence.hpp"
@@ -12,6 +14,8 @@ namespace trigpoint::fusion_gate {
 namespace {
 
 constexpr double kDefaultFixInterval_s = 1.0;
+constexpr double kHighestSpeed_mps = 60.0;
+constexpr double kGpsStep_m = 0.5;  // a GPS filter was set anew: more than corrections at 5 Hz move
 
 }  // namespace
 
@@ -55,26 +59,91 @@ Eigen::Vector3d FusionGate::Impl::gps_variance_m2() const {
   return gps->pose_covariance.diagonal().head<3>();
 }
 
-void FusionGate::Impl::publish_lio(const Odometry& odometry, Output& out) {
-  if (lio_carries()) {
-    publish(fuse(odometry, lio->T_map_odom, lio->T_map_odom_covariance), out);
+/// The drift that lio/odometry adds to its covariance is what T_map_odom's covariance is about: in
+/// map it must not count twice. lio/status tells sigma in the local map, and the odometry by how
+/// much it grew since that scan.
+Odometry FusionGate::Impl::with_covariance_in_local_map(const Odometry& odometry) const {
+  const bool told = std::all_of(
+      lio->sigma.begin(), lio->sigma.end(), [](double s) { return std::isfinite(s) && s > 0.0; });
+  if (!told || !last_scan_covariance) {
+    return odometry;
   }
+  Odometry result = odometry;
+  result.pose_covariance.setZero();
+  for (int i = 0; i < 6; ++i) {
+    const double sigma = lio->sigma[static_cast<std::size_t>(i)];
+    const double growth = odometry.pose_covariance(i, i) - (*last_scan_covariance)(i, i);
+    result.pose_covariance(i, i) = sigma * sigma + std::max(0.0, growth);
+  }
+  return result;
+}
+
+/// A new odom epoch or a found track shows in the odometry before lio/status tells of it: such a
+/// pose must not meet the old T_map_odom.
+bool FusionGate::Impl::has_odom_jumped(const Odometry& odometry) {
+  if (last_odom && !odom_jumped_at_status_ns) {
+    const double dt_s = std::abs(to_seconds(odometry.stamp_ns - last_odom->stamp_ns));
+    const double moved_m = (odometry.T_frame_child.p - last_odom->T_frame_child.p).norm();
+    if (moved_m > kHighestSpeed_mps * dt_s + kGpsStep_m) {
+      odom_jumped_at_status_ns = lio->stamp_ns;
+    }
+  }
+  if (odom_jumped_at_status_ns && lio->stamp_ns > *odom_jumped_at_status_ns) {
+    odom_jumped_at_status_ns.reset();
+  }
+  if (!odom_jumped_at_status_ns) {
+    last_odom = odometry;
+  }
+  return odom_jumped_at_status_ns.has_value();
+}
+
+void FusionGate::Impl::publish_lio(const Odometry& odometry, Output& out) {
+  if (!lio_carries() || has_odom_jumped(odometry)) {
+    return;
+  }
+  const Odometry in_map =
+      fuse(with_covariance_in_local_map(odometry), lio->T_map_odom, lio->T_map_odom_covariance);
+  const bool goes_on = last_carrier == Carrier::kLio && last_epoch == lio->odom_epoch;
+  const Pose unchanged = goes_on ? last_T_map_odom.pose() * odometry.T_frame_child
+                                 : as_predicted(odometry.stamp_ns, in_map.T_frame_child);
+  last_carrier = Carrier::kLio;
+  last_epoch = lio->odom_epoch;
+  last_T_map_odom = lio->T_map_odom;
+  publish(in_map, unchanged, out);
 }
 
 void FusionGate::Impl::publish_gps(Output& out) {
   const std::optional<Odometry> gps = gps_carries() ? gps_in_map() : std::nullopt;
-  if (gps) {
-    publish(move_to_base(*gps, robot.antenna_position_base_m), out);
+  if (!gps) {
+    return;
   }
+  const Odometry base = move_to_base(*gps, robot.antenna_position_base_m);
+  const Pose predicted = as_predicted(base.stamp_ns, base.T_frame_child);
+  const bool steps = (predicted.p - base.T_frame_child.p).norm() > kGpsStep_m;
+  const bool goes_on = last_carrier == Carrier::kGps && !steps;
+  last_carrier = Carrier::kGps;
+  publish(base, goes_on ? base.T_frame_child : predicted, out);
 }
 
-void FusionGate::Impl::publish(const Odometry& odometry, Output& out) {
+/// Where the last raw pose and its twist lead; `otherwise` when there is none.
+Pose FusionGate::Impl::as_predicted(Nanoseconds stamp_ns, const Pose& otherwise) const {
+  if (!last_raw) {
+    return otherwise;
+  }
+  const double dt_s = to_seconds(stamp_ns - last_raw->stamp_ns);
+  return last_raw->T_frame_child *
+         Pose{so3_exp(last_raw->angular_radps * dt_s), last_raw->linear_mps * dt_s};
+}
+
+void FusionGate::Impl::publish(const Odometry& odometry, const Pose& unchanged, Output& out) {
   const bool finite = odometry.T_frame_child.is_finite() && odometry.pose_covariance.allFinite();
   if (!finite || (last_fused_ns && odometry.stamp_ns <= *last_fused_ns)) {
     return;
   }
   last_fused_ns = odometry.stamp_ns;
-  out.fused = odometry;
+  last_raw = odometry;
+  out.fused_raw = odometry;
+  out.fused = mode == Mode::kSmooth ? hand_over.follow(odometry, unchanged) : odometry;
 }
 
 std::optional<std::string> FusionGate::Impl::missing_fix() const {
@@ -92,14 +161,16 @@ std::optional<std::string> FusionGate::Impl::missing_fix() const {
   return sentence("no accepted fix for %.1f s", age_s);
 }
 
-AxisStatus FusionGate::Impl::axis_status(const AxisChoice& choice) const {
+AxisStatus FusionGate::Impl::axis_status(std::size_t index, const AxisChoice& choice) const {
   AxisStatus axis{AxisSource::kNone, choice.sigma_m, choice.threshold_m, choice.reason};
   if (lio_carries()) {
     axis.source = choice.decision == AxisDecision::kFused ? AxisSource::kFused : AxisSource::kLio;
     const std::optional<std::string> missing = missing_fix();
     if (missing && mode != Mode::kLio) {
       axis.source = AxisSource::kLio;
-      axis.reason = *missing + ", " + choice.reason;
+      const bool coasts = mode == Mode::kSmooth && choice.decision == AxisDecision::kFused &&
+                          monitor.is_blind(*lio, static_cast<int>(index));
+      axis.reason = *missing + ", " + choice.reason + (coasts ? kCoasting : "");
     }
   } else if (gps_carries() && gps_in_map()) {
     axis.source = AxisSource::kGps;
@@ -115,11 +186,12 @@ FusionStatus FusionGate::Impl::status() const {
   FusionStatus result;
   result.stamp_ns = now_ns;
   result.mode = config.mode;
-  const AxisChoices choices = choose_axes(mode, gps_variance_m2(), threshold_m);
-  std::transform(
-      choices.begin(), choices.end(), result.axes.begin(), [this](const AxisChoice& choice) {
-        return axis_status(choice);
-      });
+  const AxisChoices choices = aligned() && mode == Mode::kSmooth
+                                  ? choose_smoothly()
+                                  : choose_axes(mode, gps_variance_m2(), threshold_m);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    result.axes[axis] = axis_status(axis, choices[axis]);
+  }
   result.aligned = aligned();
   if (const std::optional<Alignment> best = best_alignment()) {
     result.T_map_odom = best->T_map_odom;

@@ -307,7 +307,8 @@ void LioMapper::Impl::align(const Alignment& alignment, Nanoseconds stamp_ns, Ou
   const bool usable =
       alignment.T_map_odom.p.allFinite() && std::isfinite(alignment.T_map_odom.yaw_rad) &&
       alignment.covariance.allFinite() && alignment.covariance.diagonal().minCoeff() > 0.0;
-  if (!filter || filter->aligned() || alignment.odom_epoch != status.odom_epoch || !usable) {
+  if (!filter || alignment.odom_epoch != status.odom_epoch || !usable ||
+      (filter->aligned() && !alignment.replaces)) {
     return;  // a repeated first alignment is no news
   }
   filter->align(alignment);

@@ -249,6 +249,7 @@ void RowHistory::align(const Alignment& alignment) {
     covariance.block<4, 4>(kAt, kAt) += alignment.covariance;
   };
   for (ScanRecord& record : records_) {
+    record.rows.clear();  // of an alignment that was replaced
     set(record.before_rows, record.covariance_before_rows);
     set(record.state_odom_free, record.covariance);
     set(record.state, record.covariance);

@@ -43,6 +43,7 @@ std::vector<KnownTopic> known_topics(const RobotConfig& robot) {
                               known(topics::lio_status, "trigpoint_msgs/msg/LioStatus"),
                               known(topics::state_update, "trigpoint_msgs/msg/StateUpdate"),
                               known(topics::fusion_odometry, odometry),
+                              known(topics::fusion_odometry_raw, odometry),
                               known(topics::fusion_status, "trigpoint_msgs/msg/FusionStatus"),
                               known(topics::datum, fix),
                               known(topics::cloud_registered, cloud),

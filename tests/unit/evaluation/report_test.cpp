@@ -153,6 +153,21 @@ TEST(Report, tells_scan_times_by_nearest_rank) {
   EXPECT_EQ(times[3], "100.00");
 }
 
+TEST(Report, fails_with_the_reason_when_no_fix_was_used) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  auto gate = read_all(folder.file("gate.csv"));
+  const std::string used = ",81,72,used:72;stale:9,";
+  ASSERT_THAT(gate, HasSubstr(used));
+  for (auto at = gate.find(used); at != std::string::npos; at = gate.find(used)) {
+    gate.replace(at, used.size(), ",81,0,off_level:70;stale:11,");
+  }
+  write_all(folder.file("gate.csv"), gate);
+  EXPECT_THAT(write_report(folder.path(), kNoPictures).failures,
+              testing::Contains(HasSubstr("None of 81 fixes was used, most often because: "
+                                          "off_level (70)")));
+}
+
 TEST(Report, tells_the_gates_shares_of_time_per_axis) {
   const ScratchFolder folder;
   make_session(folder.path());

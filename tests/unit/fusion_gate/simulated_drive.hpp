@@ -21,8 +21,15 @@ struct Reception {
   GpsHealth health{GpsHealth::kOk};
 };
 
-struct Scenario {
+/// Algorithm I alone: mode smooth has its own drive (lying_drive.hpp).
+inline Config hard_mode() {
   Config config;
+  config.mode = "hard";
+  return config;
+}
+
+struct Scenario {
+  Config config{hard_mode()};
   YawPose T_map_odom{2.9, {20.0, -30.0, 4.0}};
   Eigen::Vector3d antenna_position_base_m{0.4, 0.1, 0.9};
   double duration_s{30.0};

@@ -224,6 +224,24 @@ TEST(LioMapper, a_row_told_late_ends_as_the_same_row_told_at_once) {
             kTolerance_m);
 }
 
+TEST(LioMapper, takes_an_alignment_that_replaces_its_own_and_no_other) {
+  const RoomDrive room;
+  Drive run;
+  run.drive(room, 0, 20);
+  StateUpdate update;
+  update.fix_stamp_ns = run.scans.back().odometry.stamp_ns;
+  update.decision.fill(AxisDecision::kLio);
+  const auto heading_after = [&](double yaw_rad, bool replaces) {
+    update.first_alignment =
+        Alignment{0, {yaw_rad, {}}, 0.01 * Eigen::Matrix4d::Identity(), replaces};
+    run.take(run.mapper.on_state_update(update));
+    return run.mapper.status().T_map_odom.yaw_rad;
+  };
+  EXPECT_NEAR(heading_after(0.1, false), 0.1, 1e-9);
+  EXPECT_NEAR(heading_after(0.2, false), 0.1, 1e-9);
+  EXPECT_NEAR(heading_after(0.3, true), 0.3, 1e-9);
+}
+
 TEST(LioMapper, refuses_rows_before_it_is_aligned_and_an_alignment_of_another_epoch) {
   const RoomDrive room;
   Drive run;

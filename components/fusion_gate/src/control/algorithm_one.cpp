@@ -20,8 +20,11 @@ Mode mode_of(const std::string& text) {
   if (text == "literal") {
     return Mode::kLiteral;
   }
-  assert(text == "hard");
-  return Mode::kHard;
+  if (text == "hard") {
+    return Mode::kHard;
+  }
+  assert(text == "smooth");
+  return Mode::kSmooth;
 }
 
 AxisChoice algorithm_one(double variance_m2, double threshold_m) {

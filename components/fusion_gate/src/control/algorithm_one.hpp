@@ -13,7 +13,7 @@
 
 namespace trigpoint::fusion_gate {
 
-enum class Mode { kLio, kFusion, kLiteral, kHard };
+enum class Mode { kLio, kFusion, kLiteral, kHard, kSmooth };
 
 /// The configured text; Config is validated, so that any other text is a broken invariant.
 Mode mode_of(const std::string& text);

@@ -106,11 +106,13 @@ struct LioStatus {
 enum class AxisDecision : std::uint8_t { kLio, kFused, kCoast };
 enum class UpdateMode : std::uint8_t { kRows, kOverwrite };
 
-/// The first T_map_odom of an odom epoch, computed by the gate.
+/// T_map_odom of an odom epoch, computed by the gate: the first one, or one that replaces what the
+/// mapper has because it rested on GPS that was found out.
 struct Alignment {
   std::uint32_t odom_epoch{0};
   YawPose T_map_odom;
   Eigen::Matrix4d covariance{Eigen::Matrix4d::Identity() * kUnknownVariance};  ///< yaw, x, y, z
+  bool replaces{false};  ///< to be taken also by a mapper that is aligned
 };
 
 /// At most one per accepted fix. Rows z_i = e_i^T T_map_odom (p_odom_base + R_odom_base l).

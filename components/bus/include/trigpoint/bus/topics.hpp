@@ -54,6 +54,8 @@ inline constexpr Topic<trigpoint_msgs::msg::StateUpdate> state_update{
     qos::kDefault.with_depth(100)};
 inline constexpr Topic<nav_msgs::msg::Odometry> fusion_odometry{"fusion/odometry",
                                                                 qos::kDefault.with_depth(1000)};
+inline constexpr Topic<nav_msgs::msg::Odometry> fusion_odometry_raw{"fusion/odometry_raw",
+                                                                    qos::kDefault.with_depth(1000)};
 inline constexpr Topic<trigpoint_msgs::msg::FusionStatus> fusion_status{
     "fusion/status",
     qos::kDefault.with_depth(100)};

@@ -31,9 +31,26 @@ struct AlignmentConfig {
   double residual_tolerance{4.0};       ///< chi-square may exceed its 99.9 % quantile by this
 };
 
+/// What mode smooth asks beyond Algorithm I (README, "Mode smooth").
+struct SmoothConfig {
+  double leave_factor{1.25};      ///< an open axis closes above this times its threshold
+  double leave_sigmas{3.0};       ///< a trusted fix is doubted beyond
+  double enter_sigmas{2.5};       ///< a doubted one is trusted again within
+  double raw_sigma_scale{2.0};    ///< receivers are optimistic
+  double lio_drift_share{0.003};  ///< of the distance, one sigma; beside the random walk
+  double lio_yaw_drift_rad_per_sqrt_m{0.00035};
+  double lio_blind_sigma_m{0.03};  ///< along an axis that is worse held by the map LIO may slide
+  double readmit_s{10.0};          ///< longest stretch that fixes must agree for after a doubt
+  std::int64_t readmit_fixes{5};
+  double probation_s{45.0};   ///< an alignment that GPS confirmed for less may rest on a wrong fix
+  double realign_m{10.0};     ///< driven while fixes agree with each other against it
+  double hand_over_mps{0.3};  ///< fusion/odometry follows a new T_map_odom no faster
+  double hand_over_radps{0.0174533};
+};
+
 /// The only defaults of fusion_gate; every field is described (unit, rule) in src/config.cpp.
 struct Config {
-  std::string mode{"hard"};                  ///< lio, fusion, literal, hard
+  std::string mode{"smooth"};                ///< lio, fusion, literal, hard, smooth
   Eigen::Vector3d threshold{0.5, 0.5, 1.0};  ///< m, or m^2 when threshold_on is "variance"
   std::string threshold_on{"sigma"};         ///< sigma, variance
   double min_sigma_m{0.02};                  ///< floor of a fix's sigma
@@ -49,6 +66,7 @@ struct Config {
   double foreign_after_s{2.0};               ///< a GPS writer without gps/status is foreign then
   double unknown_fix_sigma_m{3.0};           ///< of a raw fix that says nothing about itself
   AlignmentConfig alignment;
+  SmoothConfig smooth;
 };
 
 void describe(Config& config, ConfigFields& fields);

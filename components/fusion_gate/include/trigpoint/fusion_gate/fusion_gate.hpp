@@ -18,6 +18,7 @@ namespace trigpoint::fusion_gate {
 struct Output {
   std::vector<StateUpdate> state_updates;  ///< for the mapper, in order
   std::optional<Odometry> fused;           ///< base_link in map; none before the alignment
+  std::optional<Odometry> fused_raw;       ///< the same before the hand-over; with it
   std::optional<Odometry> selected;        ///< the GPS odometry that is followed
   std::optional<FusionStatus> status;
   Events events;

@@ -1,0 +1,299 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "control/fix_monitor.hpp"
+
+#include "fusion/fused_odometry.hpp"
+#include "fusion/rows.hpp"
+#include "sentence.hpp"
+
+#include <algorithm>
+#include <numeric>
+#include <vector>
+
+namespace trigpoint::fusion_gate {
+
+namespace {
+
+constexpr std::array<double, 3> kWindows_s{2.0, 10.0, 30.0};
+constexpr double kWindowTolerance = 1.5;  // the reference is at most this much older
+constexpr Nanoseconds kMemory_ns = 50 * kNanosecondsPerSecond;
+constexpr double kScatterWindow_s = 30.0;
+constexpr std::size_t kScatterFixes = 10;
+constexpr double kNewSolution_s = 5.0;  // after such a silence the receiver began anew
+constexpr double kJump_s = 1.0;
+constexpr double kUnbrokenGap_s = 2.0;  // a longer silence confirms nothing
+// An alignment that was confirmed is given up only for fixes that agree against it for much longer.
+constexpr double kLongContradiction_s = 120.0;
+constexpr double kLongerThanConfirmed = 2.0;
+
+}  // namespace
+
+FixMonitor::FixMonitor(const Config& config, const Eigen::Vector3d& antenna_position_base_m)
+    : config_(config),
+      lever_arm_base_m_(antenna_position_base_m),
+      trusts_{Trust(config, Part::kLevel), Trust(config, Part::kHeight)},
+      rival_(config.alignment) {}
+
+void FixMonitor::on_lio_status(const LioStatus& lio, double distance_m) {
+  const double moved_m = std::max(0.0, distance_m - lio_distance_m_);
+  lio_distance_m_ = distance_m;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (lio.sigma[static_cast<std::size_t>(axis)] > config_.smooth.lio_blind_sigma_m) {
+      blind_m_[axis] += moved_m;
+    }
+  }
+}
+
+bool FixMonitor::is_blind(const LioStatus& lio, int axis_map) const {
+  const Eigen::Matrix3d R_map_odom = lio.T_map_odom.pose().q.toRotationMatrix();
+  const Eigen::Vector3d sigma_odom_m(lio.sigma[0], lio.sigma[1], lio.sigma[2]);
+  const double variance_m2 =
+      R_map_odom.row(axis_map).cwiseAbs2().dot(sigma_odom_m.cwiseAbs2().transpose());
+  return variance_m2 > config_.smooth.lio_blind_sigma_m * config_.smooth.lio_blind_sigma_m;
+}
+
+Eigen::Vector3d FixMonitor::blind_variance_map_m2(const LioStatus& lio) const {
+  Eigen::Vector3d since_odom_m = Eigen::Vector3d::Zero();
+  if (const auto& last = last_trusted_[index_of(Part::kLevel)]) {
+    since_odom_m = blind_m_ - last->blind_m;
+  }
+  const Eigen::Matrix3d R_map_odom = lio.T_map_odom.pose().q.toRotationMatrix();
+  return R_map_odom.cwiseAbs2() * since_odom_m.cwiseAbs2();
+}
+
+Eigen::Vector3d FixMonitor::scatter_map_m2(const LioStatus& lio) const {
+  const Eigen::Matrix3d R_map_odom = lio.T_map_odom.pose().q.toRotationMatrix();
+  Eigen::Vector3d result = Eigen::Vector3d::Zero();
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::size_t part = index_of(axis < 2 ? Part::kLevel : Part::kHeight);
+    std::vector<double> offsets_m;
+    const Sighting* first = nullptr;
+    const Sighting* last = nullptr;
+    for (const Sighting& s : sightings_) {
+      if (s.used[part] && to_seconds(sightings_.back().stamp_ns - s.stamp_ns) <= kScatterWindow_s) {
+        first = first == nullptr ? &s : first;
+        last = &s;
+        offsets_m.push_back(s.gps_map_m[axis] - R_map_odom.row(axis).dot(s.lio_odom_m));
+      }
+    }
+    if (offsets_m.size() < kScatterFixes || (last->blind_m - first->blind_m).norm() > 0.0) {
+      continue;
+    }
+    const auto n = static_cast<double>(offsets_m.size());
+    const double mean_m = std::accumulate(offsets_m.begin(), offsets_m.end(), 0.0) / n;
+    double sum_m2 = 0.0;
+    for (const double offset_m : offsets_m) {
+      sum_m2 += (offset_m - mean_m) * (offset_m - mean_m);
+    }
+    // A random walk over the whole way d has a variance of q d / 6 about its own mean.
+    const double drift_m2 =
+        compare_displacement(*first, *last, lio, config_).covariance_m2(axis, axis) / 6.0;
+    result[axis] = std::max(0.0, sum_m2 / (n - 1.0) - drift_m2);
+  }
+  return result;
+}
+
+Sighting FixMonitor::sighting_of(const Witness& witness) const {
+  const AcceptedFix& gps = witness.raw ? *witness.raw : witness.fix;
+  Sighting sighting;
+  sighting.stamp_ns = witness.fix.stamp_ns;
+  sighting.gps_map_m = gps.antenna_map_m;
+  sighting.gps_variance_m2 = floored(gps.covariance_map_m2, config_.min_sigma_m).diagonal();
+  sighting.lio_odom_m = witness.lio_pose.T_frame_child * lever_arm_base_m_;
+  sighting.distance_m = witness.lio_pose.distance_m;
+  sighting.blind_m = blind_m_;
+  return sighting;
+}
+
+/// The row's innovation. Covariance: the fix's, T_map_odom's and the scan's at the antenna, and
+/// what LIO may have drifted beyond the mapper's random walk since a fix was trusted.
+Difference FixMonitor::level_difference(const AcceptedFix& fix,
+                                        const Sighting& sighting,
+                                        const LioStatus& lio,
+                                        Part part) const {
+  Odometry antenna;
+  antenna.T_frame_child.p = sighting.lio_odom_m;
+  antenna.pose_covariance.setZero();
+  for (int axis = 0; axis < 3; ++axis) {
+    const double sigma_m = lio.sigma[static_cast<std::size_t>(axis)];
+    antenna.pose_covariance(axis, axis) = sigma_m * sigma_m;
+  }
+  const Odometry in_map = fuse(antenna, lio.T_map_odom, lio.T_map_odom_covariance);
+  Difference result;
+  result.d_map_m = fix.antenna_map_m - in_map.T_frame_child.p;
+  result.covariance_m2 = in_map.pose_covariance.topLeftCorner<3, 3>() +
+                         floored(fix.covariance_map_m2, config_.min_sigma_m);
+  if (const auto& last = last_trusted_[index_of(part)]) {
+    const Eigen::Matrix3d R_map_odom = lio.T_map_odom.pose().q.toRotationMatrix();
+    const Eigen::Vector3d drift_m2 =
+        lio_drift_variance_m2((sighting.blind_m - last->blind_m).cwiseAbs(),
+                              std::max(0.0, sighting.distance_m - last->distance_m),
+                              config_);
+    result.covariance_m2 += R_map_odom * drift_m2.asDiagonal() * R_map_odom.transpose();
+  }
+  return result;
+}
+
+const Sighting* FixMonitor::trusted_before(Nanoseconds stamp_ns, double window_s, Part part) const {
+  const auto found = std::find_if(sightings_.rbegin(), sightings_.rend(), [&](const Sighting& s) {
+    return s.used[index_of(part)] && to_seconds(stamp_ns - s.stamp_ns) >= window_s;
+  });
+  const double oldest_s = std::max(kUnbrokenGap_s, kWindowTolerance * window_s);
+  const bool near =
+      found != sightings_.rend() && to_seconds(stamp_ns - found->stamp_ns) <= oldest_s;
+  return near ? &*found : nullptr;
+}
+
+Tests FixMonitor::test(const Witness& witness,
+                       const Sighting& sighting,
+                       const LioStatus& lio,
+                       Part part) const {
+  Tests tests;
+  const auto hold = [&](const Difference& difference, const char* code, const std::string& what) {
+    const double sigmas = sigmas_of(difference, part);
+    const SmoothConfig& limits = config_.smooth;
+    const double limit = sigmas > limits.leave_sigmas ? limits.leave_sigmas : limits.enter_sigmas;
+    if (sigmas <= limits.enter_sigmas) {
+      return;
+    }
+    const std::string text = what + sentence(" by %.2f m, at most %.2f m",
+                                             size_of(difference, part),
+                                             permitted_m(difference, part, limit));
+    tests.enters = false;
+    tests.lack = text;
+    if (sigmas > limits.leave_sigmas && !tests.contradiction) {
+      tests.contradiction = Refusal{code, text};
+    }
+  };
+  hold(level_difference(witness.fix, sighting, lio, part), "off_level", "fix is off");
+  if (witness.raw) {
+    hold(level_difference(*witness.raw, sighting, lio, part), "off_level", "receiver is off");
+  }
+  for (const double window_s : kWindows_s) {
+    const Sighting* before = trusted_before(sighting.stamp_ns, window_s, part);
+    if (before != nullptr) {
+      hold(compare_displacement(*before, sighting, lio, config_),
+           "moves_unlike_lio",
+           sentence("GPS moves unlike LIO in %.0f s", window_s));
+    }
+  }
+  return tests;
+}
+
+/// Since when GPS has crept away unnoticed: the newest trusted fix that contradicts this one over a
+/// window. None when it jumped or was away, because then nothing wrong was believed.
+std::optional<Nanoseconds> FixMonitor::taken_in_since(const Sighting& sighting,
+                                                      const LioStatus& lio,
+                                                      Part part) const {
+  const auto contradicts = [&](const Sighting* before) {
+    return before != nullptr && sigmas_of(compare_displacement(*before, sighting, lio, config_),
+                                          part) > config_.smooth.enter_sigmas;
+  };
+  const Sighting* newest = trusted_before(sighting.stamp_ns, 0.0, part);
+  if (newest == nullptr || contradicts(newest)) {
+    return std::nullopt;
+  }
+  for (const double window_s : kWindows_s) {
+    const Sighting* before = trusted_before(sighting.stamp_ns, window_s, part);
+    if (contradicts(before)) {
+      return before->stamp_ns;
+    }
+  }
+  return std::nullopt;
+}
+
+MonitorOutcome FixMonitor::judge(const Witness& witness, const LioStatus& lio) {
+  Sighting sighting = sighting_of(witness);
+  MonitorOutcome outcome;
+  for (const Part part : kParts) {
+    const std::size_t k = index_of(part);
+    const Tests tests = test(witness, sighting, lio, part);
+    outcome.change[k] = trusts_[k].judge(sighting, tests, lio);
+    if (outcome.change[k] == Trust::Change::kDoubted) {
+      outcome.taken_in_since_ns[k] = taken_in_since(sighting, lio, part);
+      forget_since(outcome.taken_in_since_ns[k].value_or(sighting.stamp_ns), part);
+    }
+  }
+  // A reflection that spoils east and north spoils the height; a wrong height alone spoils nothing.
+  outcome.trusted[0] = trusts_[0].trusted();
+  outcome.trusted[1] = trusts_[1].trusted() && outcome.trusted[0];
+  if (outcome.trusted[0] && last_trusted_[0]) {
+    const double since_s = to_seconds(sighting.stamp_ns - last_trusted_[0]->stamp_ns);
+    confirmed_s_ += since_s <= kUnbrokenGap_s ? std::max(0.0, since_s) : 0.0;
+    // A receiver that lost its solution does not find the same wrong one again.
+    confirmed_s_ += since_s > kNewSolution_s ? config_.smooth.probation_s : 0.0;
+  }
+  for (const Part part : kParts) {
+    if (outcome.trusted[index_of(part)]) {
+      sighting.used[index_of(part)] = true;
+      last_trusted_[index_of(part)] = sighting;
+    }
+  }
+  keep(sighting);
+  if (!trusts_[0].trusted() || !trusts_[1].trusted()) {
+    outcome.realignment = rival_of(sighting, trusts_[0].trusted() ? Part::kHeight : Part::kLevel);
+  }
+  return outcome;
+}
+
+void FixMonitor::on_alignment(const Witness& witness) {
+  Sighting sighting = sighting_of(witness);
+  sighting.used = {true, true};
+  for (auto& last : last_trusted_) {
+    last = sighting;
+  }
+  keep(sighting);
+}
+
+void FixMonitor::keep(const Sighting& sighting) {
+  sightings_.push_back(sighting);
+  while (sightings_.front().stamp_ns < sighting.stamp_ns - kMemory_ns) {
+    sightings_.pop_front();
+  }
+}
+
+void FixMonitor::forget_since(Nanoseconds stamp_ns, Part part) {
+  for (Sighting& sighting : sightings_) {
+    if (sighting.stamp_ns > stamp_ns) {
+      sighting.used[index_of(part)] = false;
+    }
+  }
+}
+
+/// A second alignment from the fixes that agree with each other while they are in doubt.
+std::optional<AlignmentSolution> FixMonitor::rival_of(const Sighting& sighting, Part doubted) {
+  const Trust& doubt = trust(doubted);
+  if (doubt.stretch_began()) {
+    rival_.clear();
+  }
+  rival_.add({sighting.stamp_ns,
+              sighting.gps_map_m,
+              sighting.gps_variance_m2,
+              sighting.lio_odom_m,
+              sighting.distance_m});
+  const Sighting& first = doubt.stretch().front();
+  const double agreed_s = to_seconds(sighting.stamp_ns - first.stamp_ns);
+  // Fixes that first moved unlike LIO are liars themselves; the end of a wrong fix is one jump.
+  const bool jumped = to_seconds(first.stamp_ns - doubt.since_ns()) <= kJump_s;
+  const bool on_probation = jumped && confirmed_s_ < config_.smooth.probation_s;
+  const bool outlives = doubted == Part::kLevel && agreed_s > kLongContradiction_s &&
+                        agreed_s > kLongerThanConfirmed * confirmed_s_;
+  const bool is_long_enough = sighting.distance_m - first.distance_m >= config_.smooth.realign_m;
+  const bool is_off = doubt.reason().code == "off_level";
+  if (rival_.admitted() && is_off && is_long_enough && (on_probation || outlives)) {
+    return rival_.solution();
+  }
+  return std::nullopt;
+}
+
+void FixMonitor::begin_anew() {
+  for (Trust& trust : trusts_) {
+    trust.begin_anew();
+  }
+  sightings_.clear();
+  rival_.clear();
+  last_trusted_ = {};
+  confirmed_s_ = 0.0;
+}
+
+}  // namespace trigpoint::fusion_gate

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#pragma once
+
+#include "trigpoint/base/messages.hpp"
+#include "trigpoint/fusion_gate/config.hpp"
+
+#include "alignment/alignment_window.hpp"
+#include "alignment/pose_buffer.hpp"
+#include "checks/accepted_fix.hpp"
+#include "checks/displacement.hpp"
+#include "checks/sighting.hpp"
+#include "control/trust.hpp"
+
+#include <array>
+#include <deque>
+#include <optional>
+
+namespace trigpoint::fusion_gate {
+
+/// One fix with everything that it is held against.
+struct Witness {
+  AcceptedFix fix;                 ///< what would become the row
+  std::optional<AcceptedFix> raw;  ///< the receiver's own statement in map, when it is known
+  PoseBuffer::Sample lio_pose;     ///< at its stamp
+};
+
+/// What follows from a fix for T_map_odom.
+struct MonitorOutcome {
+  std::array<bool, 2> trusted{};          ///< by part
+  std::array<Trust::Change, 2> change{};  ///< by part
+  /// By part: what was believed since then was wrong.
+  std::array<std::optional<Nanoseconds>, 2> taken_in_since_ns;
+  std::optional<AlignmentSolution> realignment;  ///< the alignment itself was wrong
+};
+
+/// Mode smooth's tests of the values: each fix against the pose in map and, over 2, 10 and 30 s,
+/// GPS displacement against LIO displacement.
+class FixMonitor {
+ public:
+  FixMonitor(const Config& config, const Eigen::Vector3d& antenna_position_base_m);
+
+  /// Adds up how far LIO went blind. `distance_m` driven so far.
+  void on_lio_status(const LioStatus& lio, double distance_m);
+
+  /// The mapper is aligned.
+  MonitorOutcome judge(const Witness& witness, const LioStatus& lio);
+
+  /// The fixes that the alignment rests on are trusted ones.
+  void on_alignment(const Witness& witness);
+
+  const Trust& trust(Part part) const { return trusts_[index_of(part)]; }
+
+  /// Variance along the axes of map that LIO gained by driving blind since the last trusted fix.
+  Eigen::Vector3d blind_variance_map_m2(const LioStatus& lio) const;
+
+  bool is_blind(const LioStatus& lio, int axis_map) const;
+
+  /// Variance of the trusted fixes of the last 30 s against LIO's displacement, less what LIO may
+  /// have drifted: what the fixes are worth, whatever they say of themselves. Zero when there are
+  /// too few of them, or LIO was blind.
+  Eigen::Vector3d scatter_map_m2(const LioStatus& lio) const;
+
+  /// A new alignment is in force, or a new odom epoch: nothing of before can be compared.
+  void begin_anew();
+
+  /// LIO found its place again: displacements across the step mean nothing.
+  void on_odom_step() { sightings_.clear(); }
+
+ private:
+  Sighting sighting_of(const Witness& witness) const;
+  Difference level_difference(const AcceptedFix& fix,
+                              const Sighting& sighting,
+                              const LioStatus& lio,
+                              Part part) const;
+  Tests test(const Witness& witness,
+             const Sighting& sighting,
+             const LioStatus& lio,
+             Part part) const;
+  std::optional<Nanoseconds> taken_in_since(const Sighting& sighting,
+                                            const LioStatus& lio,
+                                            Part part) const;
+  const Sighting* trusted_before(Nanoseconds stamp_ns, double window_s, Part part) const;
+  void forget_since(Nanoseconds stamp_ns, Part part);
+  void keep(const Sighting& sighting);
+  std::optional<AlignmentSolution> rival_of(const Sighting& sighting, Part doubted);
+
+  Config config_;
+  Eigen::Vector3d lever_arm_base_m_;
+  std::array<Trust, 2> trusts_;
+  std::deque<Sighting> sightings_;
+  AlignmentWindow rival_;
+  Eigen::Vector3d blind_m_{Eigen::Vector3d::Zero()};  // axes of odom, summed up
+  double lio_distance_m_{0.0};
+  std::array<std::optional<Sighting>, 2> last_trusted_;
+  double confirmed_s_{0.0};  // time for which fixes confirmed the alignment
+};
+
+}  // namespace trigpoint::fusion_gate

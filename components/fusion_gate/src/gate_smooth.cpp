@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// Mode smooth: Algorithm I with hysteresis, joined by tests of the values against LIO, and what
+// becomes of T_map_odom when they find out a liar.
+#include "gate.hpp"
+#include "sentence.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace trigpoint::fusion_gate {
+
+namespace {
+
+constexpr std::size_t kRawFixesKept = 64;
+constexpr double kReplacementTimeout_s = 1.0;
+constexpr double kWorthGoingBack_m = 0.01;
+
+Part part_of(int axis) {
+  return axis < 2 ? Part::kLevel : Part::kHeight;
+}
+
+}  // namespace
+
+void FusionGate::Impl::remember_raw(const AcceptedFix& fix) {
+  raw_fixes.push_back(fix);
+  if (raw_fixes.size() > kRawFixesKept) {
+    raw_fixes.pop_front();
+  }
+}
+
+Witness FusionGate::Impl::witness_of(const AcceptedFix& fix,
+                                     const PoseBuffer::Sample& at_fix) const {
+  const auto raw = std::find_if(raw_fixes.begin(), raw_fixes.end(), [&](const AcceptedFix& r) {
+    return r.stamp_ns == fix.stamp_ns;
+  });
+  return {fix, raw == raw_fixes.end() ? std::nullopt : std::optional(*raw), at_fix};
+}
+
+void FusionGate::Impl::judge_values(const AcceptedFix& fix,
+                                    const PoseBuffer::Sample& at_fix,
+                                    Output& out) {
+  verdict_changed = true;
+  if (is_replacement_awaited(out)) {
+    verdicts.record(fix.stamp_ns, false, "alignment", "waiting for the mapper to take T_map_odom");
+    return;
+  }
+  const Witness witness = witness_of(fix, at_fix);
+  const MonitorOutcome outcome = monitor.judge(witness, *lio);
+  tell_changes(outcome, out);
+  if (outcome.realignment) {
+    replace(
+        witness,
+        {lio->odom_epoch, outcome.realignment->T_map_odom, outcome.realignment->covariance, true},
+        out);
+    monitor.begin_anew();
+    monitor.on_alignment(witness);
+    placements.clear();
+    verdicts.record(fix.stamp_ns, true, "alignment", "carries a new alignment");
+    tell(out,
+         Severity::kWarning,
+         "realigned",
+         "the alignment rested on wrong fixes: odom is aligned with map anew");
+    return;
+  }
+  go_back(outcome, witness, out);
+  const AxisChoices choices = choose_smoothly();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    sigma_passes[axis] = choices[axis].sigma_m <= choices[axis].threshold_m;
+  }
+  if (any_fused(choices) || outcome.trusted[0]) {
+    AcceptedFix weighted = fix;
+    weighted.covariance_map_m2.diagonal() +=
+        (monitor.scatter_map_m2(*lio) - fix.covariance_map_m2.diagonal()).cwiseMax(0.0);
+    send_rows(weighted, choices, out);
+    return;
+  }
+  const Refusal& why = monitor.trust(Part::kLevel).reason();
+  verdicts.record(fix.stamp_ns, false, why.code, why.reason);
+}
+
+void FusionGate::Impl::go_back(const MonitorOutcome& outcome, const Witness& witness, Output& out) {
+  const auto& since = outcome.taken_in_since_ns;
+  const std::optional<Nanoseconds> wanted = since[0] ? since[0] : since[1];
+  if (!wanted) {
+    return;
+  }
+  const Eigen::Vector3d here_odom_m = witness.lio_pose.T_frame_child.p;
+  const auto alignment = placements.as_of(
+      *wanted, *lio, here_odom_m, witness.lio_pose.distance_m, !since[0].has_value());
+  if (!alignment) {
+    return;
+  }
+  const double change_m =
+      (alignment->T_map_odom.pose() * here_odom_m - lio->T_map_odom.pose() * here_odom_m).norm();
+  if (change_m < kWorthGoingBack_m) {
+    return;
+  }
+  replace(witness, *alignment, out);
+  tell(out,
+       Severity::kWarning,
+       "taken_back",
+       sentence("GPS crept away: T_map_odom goes back to where it was %.1f s ago, by %.2f m",
+                to_seconds(witness.fix.stamp_ns - *wanted),
+                change_m));
+}
+
+void FusionGate::Impl::replace(const Witness& witness, const Alignment& alignment, Output& out) {
+  const Eigen::Vector3d here_odom_m = witness.lio_pose.T_frame_child.p;
+  const Eigen::Vector3d target_map_m = alignment.T_map_odom.pose() * here_odom_m;
+  awaited = AwaitedReplacement{now_ns,
+                               here_odom_m,
+                               target_map_m,
+                               (lio->T_map_odom.pose() * here_odom_m - target_map_m).norm()};
+  out.state_updates.push_back(rows.make_alignment(witness.fix, alignment));
+}
+
+bool FusionGate::Impl::is_replacement_awaited(Output& out) {
+  if (!awaited) {
+    return false;
+  }
+  const double distance_m =
+      (lio->T_map_odom.pose() * awaited->here_odom_m - awaited->target_map_m).norm();
+  const bool taken = distance_m < 0.5 * awaited->first_distance_m;
+  const bool too_late = to_seconds(now_ns - awaited->since_ns) > kReplacementTimeout_s;
+  if (!taken && !too_late) {
+    return true;
+  }
+  if (!taken) {
+    tell(out,
+         Severity::kError,
+         "replacement_not_taken",
+         "the mapper did not take the T_map_odom that replaces its own");
+  }
+  awaited.reset();
+  return false;
+}
+
+/// As of now: sigmas grow between fixes.
+AxisChoices FusionGate::Impl::choose_smoothly() const {
+  const Eigen::Vector3d reported_m2 = gps_variance_m2();
+  const Eigen::Vector3d scatter_m2 = monitor.scatter_map_m2(*lio);
+  const Trust& level = monitor.trust(Part::kLevel);
+  AxisChoices choices;
+  for (int axis = 0; axis < 3; ++axis) {
+    AxisChoice& choice = choices[static_cast<std::size_t>(axis)];
+    const bool scatters = scatter_m2[axis] > reported_m2[axis];
+    choice = choose_trusted(axis, scatters ? scatter_m2[axis] : reported_m2[axis]);
+    choice.reason += scatters ? ", measured against LIO" : "";
+    const Trust& trust = level.trusted() ? monitor.trust(part_of(axis)) : level;
+    if (!trust.trusted()) {
+      choice.decision = AxisDecision::kLio;
+      choice.reason = trust.reason().reason;
+    }
+    if (choice.decision == AxisDecision::kLio && monitor.is_blind(*lio, axis)) {
+      choice.decision = AxisDecision::kCoast;
+      choice.reason += kCoasting;
+    }
+  }
+  return choices;
+}
+
+/// Algorithm I: an axis that GPS does not hold opens at the threshold, one that it holds closes
+/// only above leave_factor times it. Where LIO is blind GPS is taken as soon as it knows more.
+AxisChoice FusionGate::Impl::choose_trusted(int axis, double variance_m2) const {
+  const double factor =
+      sigma_passes[static_cast<std::size_t>(axis)] ? config.smooth.leave_factor : 1.0;
+  AxisChoice choice = algorithm_one(variance_m2, factor * threshold_m[axis]);
+  if (choice.decision == AxisDecision::kLio && monitor.is_blind(*lio, axis) &&
+      variance_m2 <= monitor.blind_variance_map_m2(*lio)[axis]) {
+    choice.decision = AxisDecision::kFused;
+    choice.reason += ", but LIO is blind along it: GPS carries the axis";
+  }
+  return choice;
+}
+
+void FusionGate::Impl::tell_changes(const MonitorOutcome& outcome, Output& out) const {
+  for (const Part part : kParts) {
+    const char* name = part == Part::kLevel ? "east and north" : "height";
+    if (outcome.change[index_of(part)] == Trust::Change::kDoubted) {
+      tell(out,
+           Severity::kWarning,
+           "gps_doubted",
+           std::string("GPS is not believed in ") + name + ": " +
+               monitor.trust(part).reason().reason);
+    } else if (outcome.change[index_of(part)] == Trust::Change::kReadmitted) {
+      tell(out, Severity::kInfo, "gps_readmitted", std::string("GPS is believed again in ") + name);
+    }
+  }
+}
+
+}  // namespace trigpoint::fusion_gate

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "fusion/hand_over.hpp"
+
+#include "trigpoint/base/so3.hpp"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+namespace trigpoint::fusion_gate {
+namespace {
+
+constexpr double kRate_mps = 0.3;
+constexpr double kRate_radps = std::numbers::pi / 180.0;
+constexpr double kExact = 1e-9;
+
+Odometry at(double at_s, const Pose& pose) {
+  Odometry odometry;
+  odometry.stamp_ns = from_seconds(at_s);
+  odometry.T_frame_child = pose;
+  odometry.pose_covariance = PoseCovariance::Identity() * 1e-4;
+  return odometry;
+}
+
+TEST(HandOver, passes_an_estimate_through_that_does_not_change) {
+  HandOver hand_over(kRate_mps, kRate_radps);
+  for (int k = 0; k < 5; ++k) {
+    const Pose pose{from_yaw(0.1 * k), {1.0 * k, 2.0, 3.0}};
+    const Odometry published = hand_over.follow(at(0.1 * k, pose), pose);
+    EXPECT_NEAR((published.T_frame_child.p - pose.p).norm(), 0.0, kExact);
+    EXPECT_NEAR(published.T_frame_child.q.angularDistance(pose.q), 0.0, 1e-7);
+    EXPECT_NEAR(published.pose_covariance(0, 0), 1e-4, kExact);
+  }
+}
+
+TEST(HandOver, hands_a_change_over_at_the_rate_and_no_faster) {
+  HandOver hand_over(kRate_mps, kRate_radps);
+  const Pose before{from_yaw(0.0), {0.0, 0.0, 0.0}};
+  const Pose after{from_yaw(0.05), {0.9, 0.0, 0.0}};
+  hand_over.follow(at(0.0, before), before);
+  Pose last = before;
+  for (int k = 1; k <= 40; ++k) {
+    const Odometry published = hand_over.follow(at(0.1 * k, after), k == 1 ? before : after);
+    EXPECT_LE((published.T_frame_child.p - last.p).norm(), 0.1 * kRate_mps + kExact);
+    EXPECT_LE(published.T_frame_child.q.angularDistance(last.q), 0.1 * kRate_radps + 1e-6);
+    EXPECT_NEAR(published.T_frame_child.p.x(), std::min(0.9, 0.03 * k), kExact);
+    EXPECT_NEAR(yaw_of(published.T_frame_child.q), std::min(0.05, 0.1 * k * kRate_radps), 1e-6);
+    last = published.T_frame_child;
+  }
+}
+
+TEST(HandOver, counts_what_is_left_as_uncertainty) {
+  HandOver hand_over(kRate_mps, kRate_radps);
+  const Pose before{from_yaw(0.0), {0.0, 0.0, 0.0}};
+  const Pose after{from_yaw(0.0), {0.9, 0.0, 0.0}};
+  hand_over.follow(at(0.0, before), before);
+  const Odometry published = hand_over.follow(at(0.1, after), before);
+  EXPECT_NEAR(published.pose_covariance(0, 0), 1e-4 + 0.87 * 0.87, kExact);
+  EXPECT_NEAR(published.pose_covariance(1, 1), 1e-4, kExact);
+  EXPECT_NEAR(hand_over.remaining_m().x(), -0.87, kExact);
+}
+
+TEST(HandOver, keeps_the_robots_place_when_the_estimate_turns_about_it) {
+  HandOver hand_over(kRate_mps, kRate_radps);
+  const Pose before{from_yaw(0.0), {100.0, 50.0, 0.0}};
+  const Pose after{from_yaw(0.1), {100.0, 50.0, 0.0}};
+  hand_over.follow(at(0.0, before), before);
+  const Odometry published = hand_over.follow(at(0.1, after), before);
+  EXPECT_NEAR((published.T_frame_child.p - before.p).norm(), 0.0, kExact);
+}
+
+}  // namespace
+}  // namespace trigpoint::fusion_gate

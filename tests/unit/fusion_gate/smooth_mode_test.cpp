@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// Mode smooth against receivers that lie; bounds are those of the project's goals for a drive.
+#include "lying_drive.hpp"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace trigpoint::fusion_gate {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr double kLargestStep_m = 0.05;  // in 100 ms
+
+class SmoothMode : public testing::TestWithParam<std::uint64_t> {
+ protected:
+  SmoothMode() {
+    settings.seed = GetParam();
+    settings.config.mode = "smooth";
+    const double direction_rad = 2.4 * static_cast<double>(GetParam());
+    aside = {std::cos(direction_rad), std::sin(direction_rad), 0.0};
+  }
+
+  LyingDriveSettings settings;
+  Eigen::Vector3d aside;  // of unit length, level
+};
+
+double smooth_step(double share) {
+  const double u = std::clamp(share, 0.0, 1.0);
+  return u * u * (3.0 - 2.0 * u);
+}
+
+/// The newest status at a time.
+const FusionStatus& status_at(const LyingDrive& drive, double at_s) {
+  const auto later =
+      std::find_if(drive.statuses.begin(), drive.statuses.end(), [&](const FusionStatus& status) {
+        return to_seconds(status.stamp_ns) - 1000.0 > at_s;
+      });
+  return later == drive.statuses.begin() ? drive.statuses.front() : *std::prev(later);
+}
+
+TEST_P(SmoothMode, uses_every_fix_of_a_receiver_that_is_as_good_as_it_says) {
+  LyingDrive drive(settings);
+  drive.run();
+  EXPECT_GT(drive.share_used(0, 10.0, 149.0), 0.99);
+  EXPECT_GT(drive.share_used(2, 10.0, 149.0), 0.99);
+  EXPECT_LT(drive.rms(0, 2), 0.06);
+  EXPECT_LT(drive.largest_step_m(), kLargestStep_m);
+}
+
+TEST_P(SmoothMode, refuses_a_wrong_fix_at_once_and_says_why) {
+  const double size_m = 2.0 + static_cast<double>(GetParam() % 4) * 2.0;
+  settings.lie_enu_m = [=, this](double at_s) {
+    return Eigen::Vector3d((at_s >= 70.0 && at_s < 100.0 ? size_m : 0.0) * aside);
+  };
+  LyingDrive drive(settings);
+  drive.run();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    EXPECT_EQ(drive.share_used(axis, 70.0, 100.0), 0.0) << axis;
+  }
+  EXPECT_GT(drive.share_used(0, 112.0, 149.0), 0.99);
+  EXPECT_LT(drive.worst(0, 2), 0.3);
+  EXPECT_LT(drive.largest_step_m(), kLargestStep_m);
+  const FusionStatus& lying = status_at(drive, 85.0);
+  EXPECT_EQ(lying.axes[0].source, AxisSource::kLio);
+  EXPECT_THAT(lying.axes[0].reason, HasSubstr("is off by"));
+  EXPECT_THAT(lying.verdict.reason, HasSubstr("is off by"));
+}
+
+TEST_P(SmoothMode, takes_back_what_a_wandering_fix_did_before_it_was_found_out) {
+  for (const double way_s : {20.0, 40.0}) {
+    settings.lie_enu_m = [=, this](double at_s) {
+      const double share =
+          smooth_step((at_s - 50.0) / way_s) - smooth_step((at_s - 50.0 - way_s) / way_s);
+      return Eigen::Vector3d(5.0 * share * aside);
+    };
+    LyingDrive drive(settings);
+    drive.run();
+    EXPECT_LT(drive.worst(0, 2), 0.5) << way_s;
+    EXPECT_LT(drive.worst(0, 1, 145.0), 0.15) << way_s;  // believed again
+    EXPECT_TRUE(drive.has_event("gps_doubted"));
+    EXPECT_TRUE(drive.has_event("gps_readmitted"));
+    EXPECT_LT(drive.largest_step_m(), kLargestStep_m);
+  }
+}
+
+TEST_P(SmoothMode, keeps_east_and_north_when_only_the_height_lies) {
+  for (const double rate_mps : {0.0, 0.1}) {
+    settings.lie_enu_m = [=](double at_s) {
+      const double step_m = rate_mps > 0.0 ? rate_mps * (at_s - 60.0) : 30.0;
+      return Eigen::Vector3d(0.0, 0.0, at_s >= 60.0 ? step_m : 0.0);
+    };
+    LyingDrive drive(settings);
+    drive.run();
+    EXPECT_LT(drive.rms(0, 1), 0.08);
+    EXPECT_GT(drive.share_used(0, 60.0, 149.0), 0.99);
+    EXPECT_EQ(drive.share_used(2, 75.0, 149.0), 0.0);
+    for (const DriveSample& sample : drive.samples) {
+      ASSERT_LT(std::abs(sample.error_m.z()), 0.003 * sample.distance_m + 0.1) << sample.at_s;
+    }
+    EXPECT_LT(drive.largest_step_m(), kLargestStep_m);
+  }
+}
+
+TEST_P(SmoothMode, aligns_anew_within_20_m_after_a_wrong_fix_at_the_start) {
+  settings.lie_enu_m = [this](double at_s) {
+    return Eigen::Vector3d((at_s < 30.0 ? 5.0 : 0.0) * aside);
+  };
+  LyingDrive drive(settings);
+  drive.run();
+  EXPECT_TRUE(drive.has_event("realigned"));
+  for (const DriveSample& sample : drive.samples) {
+    if (sample.at_s > 30.0 + 20.0 / settings.speed_mps) {
+      ASSERT_LT(sample.raw_error_m.norm(), 0.2) << sample.at_s;
+    }
+  }
+  EXPECT_LT(drive.worst(0, 2, 30.0 + 5.0 / 0.3 + 20.0 / settings.speed_mps), 0.2);
+  EXPECT_LT(drive.largest_step_m(), kLargestStep_m);
+}
+
+TEST_P(SmoothMode, keeps_a_young_alignment_that_fixes_confirmed_after_an_outage) {
+  settings.duration_s = 80.0;
+  settings.has_fix = [](double at_s) { return at_s < 15.0 || at_s >= 25.0; };
+  settings.lie_enu_m = [this](double at_s) {
+    return Eigen::Vector3d((at_s >= 32.0 && at_s < 60.0 ? 3.0 : 0.0) * aside);
+  };
+  LyingDrive drive(settings);
+  drive.run();
+  EXPECT_FALSE(drive.has_event("realigned"));
+  EXPECT_LT(drive.worst(0, 2), 0.3);
+}
+
+TEST_P(SmoothMode, does_not_follow_a_wanderer_that_stands_still_while_the_alignment_is_young) {
+  settings.duration_s = 80.0;
+  settings.has_fix = [](double at_s) { return at_s < 20.0 || at_s >= 35.0; };
+  settings.lie_enu_m = [this](double at_s) {
+    return Eigen::Vector3d(5.0 * smooth_step((at_s - 25.0) / 25.0) * aside);
+  };
+  LyingDrive drive(settings);
+  drive.run();
+  EXPECT_FALSE(drive.has_event("realigned"));
+  EXPECT_LT(drive.worst(0, 2), 0.4);
+}
+
+TEST_P(SmoothMode, is_back_in_5_s_when_gps_returns_after_an_outage_with_half_a_percent_of_drift) {
+  settings.speed_mps = 1.2;
+  settings.duration_s = 190.0;
+  settings.has_fix = [](double at_s) { return at_s < 45.0 || at_s >= 165.0; };
+  settings.lio_jump_at_s = 100.0;
+  settings.lio_jump_m = 0.005 * 1.2 * 120.0 * aside;
+  LyingDrive drive(settings);
+  drive.run();
+  EXPECT_LT(drive.worst(0, 2, 45.0, 165.0), 0.5 / 100.0 * 1.2 * 120.0 + 0.4);
+  EXPECT_LT(drive.worst(0, 1, 170.2), 0.1);
+  EXPECT_THAT(status_at(drive, 120.0).axes[1].reason, HasSubstr("no accepted fix for"));
+}
+
+TEST_P(SmoothMode, lets_gps_carry_the_axis_along_which_lio_is_blind) {
+  settings.is_blind = [](double at_s) { return at_s >= 60.0 && at_s < 90.0; };
+  settings.speed_blind_share = 0.06;  // as measured in components/simulator's tunnel
+  settings.claimed_sigma_m = 0.3;     // twice that is above the threshold
+  settings.duration_s = 120.0;
+  LyingDrive drive(settings);
+  drive.run();
+  EXPECT_LT(drive.worst(0, 1, 60.0, 90.0), 0.4);
+  settings.config.mode = "hard";
+  LyingDrive hard(settings);
+  hard.run();
+  EXPECT_GT(hard.worst(0, 1, 60.0, 90.0), 1.0);
+}
+
+TEST_P(SmoothMode, coasts_and_says_so_where_lio_is_blind_and_gps_is_away) {
+  settings.is_blind = [](double at_s) { return at_s >= 60.0 && at_s < 80.0; };
+  settings.has_fix = [](double at_s) { return at_s < 60.0 || at_s >= 80.0; };
+  settings.T_map_odom.yaw_rad = 0.0;
+  settings.duration_s = 100.0;
+  LyingDrive drive(settings);
+  drive.run();
+  EXPECT_THAT(status_at(drive, 70.0).axes[0].reason, HasSubstr("coasting"));
+  EXPECT_GT(drive.share_used(0, 82.0, 99.0), 0.9);
+}
+
+TEST_P(SmoothMode, does_not_lock_itself_out_after_a_drift_of_one_percent) {
+  settings.has_fix = [](double at_s) { return at_s < 60.0 || at_s >= 110.0; };
+  settings.lio_jump_at_s = 80.0;
+  settings.lio_jump_m = 0.01 * 3.0 * 50.0 * aside;
+  LyingDrive drive(settings);
+  drive.run();
+  EXPECT_LT(drive.worst(0, 1, 130.0), 0.1);
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, SmoothMode, testing::Values(11, 12, 13));
+
+}  // namespace
+}  // namespace trigpoint::fusion_gate
