@@ -1,0 +1,330 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "trigpoint/lio_mapper/see_through.hpp"
+
+#include "plane_fit.hpp"
+#include "voxel_key.hpp"
+#include <tsl/robin_map.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+#include <optional>
+#include <utility>
+#include <vector>
+
+namespace trigpoint::lio_mapper {
+
+using Eigen::Vector3d;
+
+namespace {
+
+constexpr double kPixel_rad = std::numbers::pi / 180.0;
+constexpr int kColumns = 360;
+constexpr int kRows = 180;
+constexpr double kNearest_m = 1.0;  // the robot itself
+constexpr double kBlock_m = 8.0;    // voxels are kept by blocks, to find those near a scan
+/// Of the plane through a voxel's neighbourhood.
+constexpr double kFlat = 0.1;       // smallest over middle eigenvalue
+constexpr double kOnPlane_m = 0.1;  // of the voxel's own mean
+constexpr int kFewestForPlane = 6;
+/// Next to a moving voxel less evidence is enough.
+constexpr std::uint16_t kFewHits = 3;
+constexpr std::size_t kNobody = ~std::size_t{0};
+
+struct Voxel {
+  VoxelIndex index;
+  std::uint16_t hits{0};   ///< scans that have a point in it
+  std::uint16_t views{0};  ///< scans that look through it
+  std::uint32_t count{0};
+  std::size_t last_scan{kNobody};
+  /// Sums about the voxel's centre, m and m^2.
+  Eigen::Array3f sum{Eigen::Array3f::Zero()};
+  Eigen::Array3f squares{Eigen::Array3f::Zero()};
+  Eigen::Array3f products{Eigen::Array3f::Zero()};
+  enum class Shape : std::uint8_t { kUnknown, kPlane, kNone } shape{Shape::kUnknown};
+  bool moving{false};
+  Eigen::Vector3f normal{Eigen::Vector3f::Zero()};
+};
+
+struct Ray {
+  Eigen::Vector3f direction{Eigen::Vector3f::Zero()};
+  float range_m{0.0F};  ///< 0: none
+};
+
+int column_of(const Vector3d& v) {
+  const int column = static_cast<int>((std::atan2(v.y(), v.x()) + std::numbers::pi) / kPixel_rad);
+  return std::clamp(column, 0, kColumns - 1);
+}
+
+int row_of(const Vector3d& v, double range_m) {
+  const double elevation = std::asin(std::clamp(v.z() / range_m, -1.0, 1.0));
+  const int row = static_cast<int>((elevation + 0.5 * std::numbers::pi) / kPixel_rad);
+  return std::clamp(row, 0, kRows - 1);
+}
+
+std::uint16_t one_more(std::uint16_t count) {
+  return count == UINT16_MAX ? count : static_cast<std::uint16_t>(count + 1);
+}
+
+}  // namespace
+
+struct SeeThrough::Impl {
+  explicit Impl(const SeeThroughOptions& chosen)
+      : options(chosen), inverse_voxel_per_m(1.0 / chosen.voxel_m) {}
+
+  Vector3d centre_of(const VoxelIndex& i) const {
+    return options.voxel_m * (Vector3d(i.x, i.y, i.z) + Vector3d::Constant(0.5));
+  }
+
+  Vector3d mean_of(const Voxel& voxel) const {
+    return centre_of(voxel.index) +
+           (voxel.sum / static_cast<float>(voxel.count)).matrix().cast<double>();
+  }
+
+  const Voxel* find(const Vector3d& p) const {
+    if (!voxel_index_fits(p.x(), p.y(), p.z(), inverse_voxel_per_m)) {
+      return nullptr;
+    }
+    const auto found = index.find(voxel_key(voxel_index(p.x(), p.y(), p.z(), inverse_voxel_per_m)));
+    return found == index.end() ? nullptr : &voxels[found->second];
+  }
+
+  Voxel* find_or_create(const Vector3d& p) {
+    if (!voxel_index_fits(p.x(), p.y(), p.z(), inverse_voxel_per_m)) {
+      return nullptr;
+    }
+    const VoxelIndex i = voxel_index(p.x(), p.y(), p.z(), inverse_voxel_per_m);
+    const auto [place, is_new] =
+        index.try_emplace(voxel_key(i), static_cast<std::uint32_t>(voxels.size()));
+    if (is_new) {
+      blocks[block_key_of(p)].push_back(static_cast<std::uint32_t>(voxels.size()));
+      voxels.emplace_back().index = i;
+    }
+    return &voxels[place->second];
+  }
+
+  static VoxelKey block_key_of(const Vector3d& p) {
+    return voxel_key(voxel_index(p.x(), p.y(), 0.0, 1.0 / kBlock_m));
+  }
+
+  /// Moments of a voxel about the centre of another.
+  Moments moments_about(const Voxel& voxel, const Vector3d& centre_m) const {
+    const Eigen::Array3d d = (centre_of(voxel.index) - centre_m).array();
+    const Eigen::Array3d sum = voxel.sum.cast<double>();
+    const auto n = static_cast<double>(voxel.count);
+    const auto turned = [](const Eigen::Array3d& a) { return Eigen::Array3d(a[1], a[2], a[0]); };
+    Moments moments;
+    moments.count = static_cast<int>(voxel.count);
+    moments.sum = sum + n * d;
+    moments.squares = voxel.squares.cast<double>() + 2.0 * d * sum + n * d * d;
+    moments.products =
+        voxel.products.cast<double>() + d * turned(sum) + turned(d) * sum + n * d * turned(d);
+    return moments;
+  }
+
+  void fit(Voxel& voxel) {
+    const Vector3d centre_m = centre_of(voxel.index);
+    Moments moments;
+    for (int dx = -1; dx <= 1; ++dx) {
+      for (int dy = -1; dy <= 1; ++dy) {
+        for (int dz = -1; dz <= 1; ++dz) {
+          const VoxelIndex& i = voxel.index;
+          const auto found = index.find(voxel_key({i.x + dx, i.y + dy, i.z + dz}));
+          if (found != index.end()) {
+            moments += moments_about(voxels[found->second], centre_m);
+          }
+        }
+      }
+    }
+    voxel.shape = Voxel::Shape::kNone;
+    const std::optional<PlaneFit> plane =
+        moments.count < kFewestForPlane ? std::nullopt : fit_plane(moments);
+    if (plane && plane->eigenvalues[0] < kFlat * plane->eigenvalues[1] &&
+        std::abs(plane->normal.dot(mean_of(voxel) - centre_m - plane->centroid)) < kOnPlane_m) {
+      voxel.shape = Voxel::Shape::kPlane;
+      voxel.normal = plane->normal.cast<float>();
+    }
+  }
+
+  /// The nearest point of each pixel: what is in front decides.
+  void draw(const PointCloud& points, const Vector3d& origin_m) {
+    image.assign(static_cast<std::size_t>(kColumns) * kRows, Ray{});
+    for (const PointXyzi& point : points) {
+      const Vector3d v = point.position().cast<double>() - origin_m;
+      const double range_m = v.norm();
+      if (!(range_m > kNearest_m)) {
+        continue;
+      }
+      Ray& ray = pixel(column_of(v), row_of(v, range_m));
+      if (ray.range_m == 0.0F || range_m < ray.range_m) {
+        ray = {(v / range_m).cast<float>(), static_cast<float>(range_m)};
+      }
+    }
+  }
+
+  Ray& pixel(int column, int row) {
+    return image[static_cast<std::size_t>(row * kColumns + column)];
+  }
+
+  /// The margin behind a plane counts along its normal as well: range noise of skimming rays.
+  bool goes_through(Voxel& voxel, const Vector3d& mean_m, const Ray& ray) {
+    if (voxel.shape == Voxel::Shape::kUnknown) {
+      fit(voxel);
+    }
+    if (voxel.shape == Voxel::Shape::kNone) {
+      return true;
+    }
+    const Vector3d normal = voxel.normal.cast<double>();
+    const double sine = normal.dot(ray.direction.cast<double>());
+    if (std::abs(sine) < options.least_incidence) {
+      return false;
+    }
+    return ray.range_m > normal.dot(mean_m) / sine + options.margin_m;
+  }
+
+  /// Whether the scan looks through the voxel: a ray does, and none ends in it or before it.
+  bool is_looked_through(Voxel& voxel, const Vector3d& mean_m, double range_m) {
+    const int column = column_of(mean_m);
+    const int row = row_of(mean_m, range_m);
+    bool through = false;
+    for (int dr = -1; dr <= 1; ++dr) {
+      if (row + dr < 0 || row + dr >= kRows) {
+        continue;
+      }
+      for (int dc = -1; dc <= 1; ++dc) {
+        const Ray& ray = pixel((column + dc + kColumns) % kColumns, row + dr);
+        const double along_m = ray.direction.cast<double>().dot(mean_m);
+        const double aside2 = mean_m.squaredNorm() - along_m * along_m;
+        if (ray.range_m == 0.0F || aside2 > options.ray_radius_m * options.ray_radius_m) {
+          continue;
+        }
+        if (ray.range_m < along_m + options.margin_m) {
+          return false;
+        }
+        through = through || goes_through(voxel, mean_m, ray);
+      }
+    }
+    return through;
+  }
+
+  void look_at(Voxel& voxel, const Vector3d& origin_m) {
+    const Vector3d mean_m = mean_of(voxel) - origin_m;
+    const double range_m = mean_m.norm();
+    if (range_m > kNearest_m && range_m < options.range_m &&
+        is_looked_through(voxel, mean_m, range_m)) {
+      voxel.views = one_more(voxel.views);
+    }
+  }
+
+  bool is_outvoted(const Voxel& voxel) const {
+    return voxel.views >= options.least_views &&
+           static_cast<double>(voxel.views) > options.views_per_hit * voxel.hits;
+  }
+
+  /// What little is known of a voxel beside a moving one.
+  bool goes_along(const Voxel& voxel) const {
+    return !voxel.moving && voxel.hits <= kFewHits && voxel.views >= 1 && voxel.views >= voxel.hits;
+  }
+
+  void spread_from(const Voxel& voxel, std::vector<std::uint32_t>& next) const {
+    for (int dx = -1; dx <= 1; ++dx) {
+      for (int dy = -1; dy <= 1; ++dy) {
+        for (int dz = -1; dz <= 1; ++dz) {
+          const VoxelIndex& i = voxel.index;
+          const auto found = index.find(voxel_key({i.x + dx, i.y + dy, i.z + dz}));
+          if (found != index.end() && goes_along(voxels[found->second])) {
+            next.push_back(found->second);
+          }
+        }
+      }
+    }
+  }
+
+  SeeThroughOptions options;
+  double inverse_voxel_per_m;
+  std::vector<Voxel> voxels;
+  tsl::robin_map<VoxelKey, std::uint32_t, VoxelKeyHash> index;
+  tsl::robin_map<VoxelKey, std::vector<std::uint32_t>, VoxelKeyHash> blocks;
+  std::vector<Ray> image;
+  std::size_t scans{0};
+  std::size_t moving{0};
+};
+
+SeeThrough::SeeThrough(const SeeThroughOptions& options) : impl_(std::make_unique<Impl>(options)) {}
+
+SeeThrough::~SeeThrough() = default;
+
+void SeeThrough::add(const PointCloud& points_map) {
+  for (const PointXyzi& point : points_map) {
+    const Vector3d p = point.position().cast<double>();
+    Voxel* const voxel = impl_->find_or_create(p);
+    if (voxel == nullptr) {
+      continue;
+    }
+    const Eigen::Array3f d = (p - impl_->centre_of(voxel->index)).cast<float>().array();
+    ++voxel->count;
+    voxel->sum += d;
+    voxel->squares += d * d;
+    voxel->products += d * Eigen::Array3f(d[1], d[2], d[0]);
+    if (voxel->last_scan != impl_->scans) {
+      voxel->last_scan = impl_->scans;
+      voxel->hits = one_more(voxel->hits);
+    }
+  }
+  ++impl_->scans;
+}
+
+void SeeThrough::look(const PointCloud& points_map, const Vector3d& origin_map_m) {
+  impl_->draw(points_map, origin_map_m);
+  const int reach = static_cast<int>(std::ceil(impl_->options.range_m / kBlock_m));
+  for (int dx = -reach; dx <= reach; ++dx) {
+    for (int dy = -reach; dy <= reach; ++dy) {
+      const Vector3d corner = origin_map_m + kBlock_m * Vector3d(dx, dy, 0.0);
+      const auto block = impl_->blocks.find(Impl::block_key_of(corner));
+      if (block != impl_->blocks.end()) {
+        for (const std::uint32_t voxel : block->second) {
+          impl_->look_at(impl_->voxels[voxel], origin_map_m);
+        }
+      }
+    }
+  }
+}
+
+void SeeThrough::decide() {
+  std::vector<std::uint32_t> edge;
+  for (std::uint32_t i = 0; i < impl_->voxels.size(); ++i) {
+    impl_->voxels[i].moving = impl_->is_outvoted(impl_->voxels[i]);
+    if (impl_->voxels[i].moving) {
+      edge.push_back(i);
+    }
+  }
+  impl_->moving = edge.size();
+  while (!edge.empty()) {
+    std::vector<std::uint32_t> next;
+    for (const std::uint32_t i : edge) {
+      impl_->spread_from(impl_->voxels[i], next);
+    }
+    std::erase_if(next,
+                  [&](std::uint32_t i) { return std::exchange(impl_->voxels[i].moving, true); });
+    impl_->moving += next.size();
+    edge = std::move(next);
+  }
+}
+
+bool SeeThrough::is_moving(const PointXyzi& point_map) const {
+  const Voxel* const voxel = impl_->find(point_map.position().cast<double>());
+  return voxel != nullptr && voxel->moving;
+}
+
+std::size_t SeeThrough::voxels() const {
+  return impl_->voxels.size();
+}
+
+std::size_t SeeThrough::moving_voxels() const {
+  return impl_->moving;
+}
+
+}  // namespace trigpoint::lio_mapper
