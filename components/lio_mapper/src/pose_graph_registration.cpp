@@ -23,8 +23,9 @@ constexpr int kMostSteps = 40;
 constexpr double kFirstWidth_m = 0.8;
 constexpr double kLastWidth_m = 0.05;
 constexpr double kNarrowing = 0.7;
-constexpr double kConverged_m = 5e-4;
-constexpr double kConverged_rad = 5e-5;
+/// Steps this much smaller than the noise, in sigmas, are no longer taken: along a direction that
+/// surfaces leave free, planes that come and go keep the cloud trembling.
+constexpr double kConverged2 = 0.01;
 constexpr double kNear_m = 0.1;
 constexpr double kPointSigma_m = 0.03;
 /// Neighbouring points share the map's errors (as matching.independent_residuals).
@@ -108,7 +109,7 @@ std::optional<CloudFit> fit_cloud(const std::vector<Vector3d>& points_m,
     const Vector6d e = -information.ldlt().solve(gradient);
     T.p += e.head<3>();
     T.q = (T.q * so3_exp(e.tail<3>())).normalized();
-    if (narrowest && e.head<3>().norm() < kConverged_m && e.tail<3>().norm() < kConverged_rad) {
+    if (narrowest && e.dot(information * e) < kConverged2) {
       const Sums last = sums_at(points_m, map, T, width_m);
       Matrix6d seen = last.information;
       seen.diagonal() += 1e-2 * prior;  // what no surface holds is known to ten metres

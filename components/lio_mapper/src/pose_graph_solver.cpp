@@ -128,7 +128,8 @@ class Problem {
     options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
     options.num_threads = 1;  // sums in one order: the same bits on every run
     options.max_num_iterations = 60;
-    options.function_tolerance = 1e-7;
+    options.initial_trust_region_radius = 1e8;  // nearly linear: begin with whole steps
+    options.function_tolerance = 1e-9;
     options.logging_type = ceres::SILENT;
     ceres::Solver::Summary summary;
     ceres::Solve(options, &problem_, &summary);

@@ -4,6 +4,7 @@
 
 #include "plane_fit.hpp"
 #include "voxel_key.hpp"
+#include "workers.hpp"
 #include <tsl/robin_map.h>
 
 #include <algorithm>
@@ -30,8 +31,13 @@ constexpr double kBlock_m = 8.0;    // voxels are kept by blocks, to find those 
 constexpr double kFlat = 0.1;       // smallest over middle eigenvalue
 constexpr double kOnPlane_m = 0.1;  // of the voxel's own mean
 constexpr int kFewestForPlane = 6;
+/// A single ring on the ground is a line; so is one across a walker, who has ground below.
+constexpr double kUprightSigma_m = 0.06;
+constexpr double kLeastBelow_m = 0.4;
+constexpr double kMostBelow_m = 2.4;
 /// Next to a moving voxel less evidence is enough.
 constexpr std::uint16_t kFewHits = 3;
+constexpr std::size_t kThreads = 2;
 constexpr std::size_t kNobody = ~std::size_t{0};
 
 struct Voxel {
@@ -44,7 +50,8 @@ struct Voxel {
   Eigen::Array3f sum{Eigen::Array3f::Zero()};
   Eigen::Array3f squares{Eigen::Array3f::Zero()};
   Eigen::Array3f products{Eigen::Array3f::Zero()};
-  enum class Shape : std::uint8_t { kUnknown, kPlane, kNone } shape{Shape::kUnknown};
+  /// kFloor: too few points to tell, and perhaps ground, which every ray skims.
+  enum class Shape : std::uint8_t { kUnknown, kPlane, kNone, kFloor } shape{Shape::kUnknown};
   bool moving{false};
   Eigen::Vector3f normal{Eigen::Vector3f::Zero()};
 };
@@ -54,15 +61,14 @@ struct Ray {
   float range_m{0.0F};  ///< 0: none
 };
 
-int column_of(const Vector3d& v) {
-  const int column = static_cast<int>((std::atan2(v.y(), v.x()) + std::numbers::pi) / kPixel_rad);
-  return std::clamp(column, 0, kColumns - 1);
+/// May be a turn too small or too large.
+int column_of(double azimuth_rad) {
+  return static_cast<int>(std::floor((azimuth_rad + std::numbers::pi) / kPixel_rad));
 }
 
-int row_of(const Vector3d& v, double range_m) {
-  const double elevation = std::asin(std::clamp(v.z() / range_m, -1.0, 1.0));
-  const int row = static_cast<int>((elevation + 0.5 * std::numbers::pi) / kPixel_rad);
-  return std::clamp(row, 0, kRows - 1);
+int row_of(double elevation_rad) {
+  const double row = std::floor((elevation_rad + 0.5 * std::numbers::pi) / kPixel_rad);
+  return std::clamp(static_cast<int>(row), 0, kRows - 1);
 }
 
 std::uint16_t one_more(std::uint16_t count) {
@@ -146,7 +152,31 @@ struct SeeThrough::Impl {
         std::abs(plane->normal.dot(mean_of(voxel) - centre_m - plane->centroid)) < kOnPlane_m) {
       voxel.shape = Voxel::Shape::kPlane;
       voxel.normal = plane->normal.cast<float>();
+    } else if (height_of(moments) < kUprightSigma_m && !stands_on_something(voxel.index)) {
+      voxel.shape = Voxel::Shape::kFloor;
     }
+  }
+
+  static double height_of(const Moments& moments) {
+    const double n = moments.count;
+    const double mean = moments.sum[2] / n;
+    return std::sqrt(std::max(0.0, moments.squares[2] / n - mean * mean));
+  }
+
+  /// Whether anything was seen some way below.
+  bool stands_on_something(const VoxelIndex& i) const {
+    const int nearest = static_cast<int>(std::ceil(kLeastBelow_m * inverse_voxel_per_m));
+    const int farthest = static_cast<int>(std::ceil(kMostBelow_m * inverse_voxel_per_m));
+    for (int dz = nearest; dz <= farthest; ++dz) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        for (int dy = -1; dy <= 1; ++dy) {
+          if (index.find(voxel_key({i.x + dx, i.y + dy, i.z - dz})) != index.end()) {
+            return true;
+          }
+        }
+      }
+    }
+    return false;
   }
 
   /// The nearest point of each pixel: what is in front decides.
@@ -158,7 +188,8 @@ struct SeeThrough::Impl {
       if (!(range_m > kNearest_m)) {
         continue;
       }
-      Ray& ray = pixel(column_of(v), row_of(v, range_m));
+      const int column = column_of(std::atan2(v.y(), v.x())) % kColumns;
+      Ray& ray = pixel(column, row_of(std::asin(v.z() / range_m)));
       if (ray.range_m == 0.0F || range_m < ray.range_m) {
         ray = {(v / range_m).cast<float>(), static_cast<float>(range_m)};
       }
@@ -174,8 +205,8 @@ struct SeeThrough::Impl {
     if (voxel.shape == Voxel::Shape::kUnknown) {
       fit(voxel);
     }
-    if (voxel.shape == Voxel::Shape::kNone) {
-      return true;
+    if (voxel.shape != Voxel::Shape::kPlane) {
+      return voxel.shape == Voxel::Shape::kNone;
     }
     const Vector3d normal = voxel.normal.cast<double>();
     const double sine = normal.dot(ray.direction.cast<double>());
@@ -185,20 +216,28 @@ struct SeeThrough::Impl {
     return ray.range_m > normal.dot(mean_m) / sine + options.margin_m;
   }
 
-  /// Whether the scan looks through the voxel: a ray does, and none ends in it or before it.
+  /// Whether the scan looks through the voxel: a ray does, and none ends in it or before it. Only
+  /// pixels that a ray within the radius may lie in are asked.
   bool is_looked_through(Voxel& voxel, const Vector3d& mean_m, double range_m) {
-    const int column = column_of(mean_m);
-    const int row = row_of(mean_m, range_m);
+    const double aside_rad = options.ray_radius_m / range_m;
+    const double level_m = std::max(mean_m.head<2>().norm(), options.ray_radius_m);
+    const double aside_azimuth_rad = options.ray_radius_m / level_m;
+    const double azimuth = std::atan2(mean_m.y(), mean_m.x());
+    const double elevation = std::atan2(mean_m.z(), level_m);
+    const int first_row = row_of(elevation - aside_rad);
+    const int last_row = row_of(elevation + aside_rad);
+    const int first_column = column_of(azimuth - aside_azimuth_rad);
+    const int last_column = column_of(azimuth + aside_azimuth_rad);
     bool through = false;
-    for (int dr = -1; dr <= 1; ++dr) {
-      if (row + dr < 0 || row + dr >= kRows) {
-        continue;
-      }
-      for (int dc = -1; dc <= 1; ++dc) {
-        const Ray& ray = pixel((column + dc + kColumns) % kColumns, row + dr);
+    for (int row = first_row; row <= last_row; ++row) {
+      for (int column = first_column; column <= last_column; ++column) {
+        const Ray& ray = pixel((column + kColumns) % kColumns, row);
+        if (ray.range_m == 0.0F) {
+          continue;
+        }
         const double along_m = ray.direction.cast<double>().dot(mean_m);
-        const double aside2 = mean_m.squaredNorm() - along_m * along_m;
-        if (ray.range_m == 0.0F || aside2 > options.ray_radius_m * options.ray_radius_m) {
+        const double aside2 = range_m * range_m - along_m * along_m;
+        if (aside2 > options.ray_radius_m * options.ray_radius_m) {
           continue;
         }
         if (ray.range_m < along_m + options.margin_m) {
@@ -217,6 +256,20 @@ struct SeeThrough::Impl {
         is_looked_through(voxel, mean_m, range_m)) {
       voxel.views = one_more(voxel.views);
     }
+  }
+
+  std::vector<const std::vector<std::uint32_t>*> blocks_near(const Vector3d& origin_m) const {
+    const int reach = static_cast<int>(std::ceil(options.range_m / kBlock_m));
+    std::vector<const std::vector<std::uint32_t>*> near;
+    for (int dx = -reach; dx <= reach; ++dx) {
+      for (int dy = -reach; dy <= reach; ++dy) {
+        const auto block = blocks.find(block_key_of(origin_m + kBlock_m * Vector3d(dx, dy, 0.0)));
+        if (block != blocks.end()) {
+          near.push_back(&block->second);
+        }
+      }
+    }
+    return near;
   }
 
   bool is_outvoted(const Voxel& voxel) const {
@@ -249,6 +302,7 @@ struct SeeThrough::Impl {
   tsl::robin_map<VoxelKey, std::uint32_t, VoxelKeyHash> index;
   tsl::robin_map<VoxelKey, std::vector<std::uint32_t>, VoxelKeyHash> blocks;
   std::vector<Ray> image;
+  Workers workers{kThreads};
   std::size_t scans{0};
   std::size_t moving{0};
 };
@@ -279,18 +333,12 @@ void SeeThrough::add(const PointCloud& points_map) {
 
 void SeeThrough::look(const PointCloud& points_map, const Vector3d& origin_map_m) {
   impl_->draw(points_map, origin_map_m);
-  const int reach = static_cast<int>(std::ceil(impl_->options.range_m / kBlock_m));
-  for (int dx = -reach; dx <= reach; ++dx) {
-    for (int dy = -reach; dy <= reach; ++dy) {
-      const Vector3d corner = origin_map_m + kBlock_m * Vector3d(dx, dy, 0.0);
-      const auto block = impl_->blocks.find(Impl::block_key_of(corner));
-      if (block != impl_->blocks.end()) {
-        for (const std::uint32_t voxel : block->second) {
-          impl_->look_at(impl_->voxels[voxel], origin_map_m);
-        }
-      }
+  const std::vector<const std::vector<std::uint32_t>*> near = impl_->blocks_near(origin_map_m);
+  impl_->workers.run(near.size(), [&](std::size_t i) {  // a voxel is of one block only
+    for (const std::uint32_t voxel : *near[i]) {
+      impl_->look_at(impl_->voxels[voxel], origin_map_m);
     }
-  }
+  });
 }
 
 void SeeThrough::decide() {

@@ -15,6 +15,7 @@ namespace {
 using Eigen::Vector3d;
 using test::circle;
 using test::driven_with_drift;
+using test::moved_by;
 using test::row_at;
 using test::seen_from;
 using test::walled_world;
@@ -139,9 +140,10 @@ TEST(PoseGraph, is_not_moved_by_a_wrong_fix_among_good_ones) {
 TEST(PoseGraph, levels_by_the_tilt_that_was_learnt_farther_on) {
   const std::vector<Pose> truth = straight(150);
   const Eigen::Quaterniond q_odom_map = so3_exp({0.0, 0.01, 0.0});  // odom leans by 0.6 degree
-  GraphInput input = driven_with_drift(truth, 0.0, Vector3d::Zero(), {q_odom_map, {}});
+  GraphInput input =
+      driven_with_drift(truth, 0.0, Vector3d::Zero(), {q_odom_map, Vector3d::Zero()});
   align(input, {});
-  for (std::size_t i = 120; i < truth.size(); ++i) {
+  for (std::size_t i = 90; i < truth.size(); ++i) {
     input.keyframes[i].T_map_odom.tilt_rad = {0.0, -0.01};
   }
   const CorrectedPast past = correct_past(input, no_cloud, without_loops());
@@ -182,7 +184,7 @@ TEST_F(TwoLaps, do_not_believe_a_place_that_only_looks_like_another) {
   // One keyframe in eight of the second lap sees the world 1.5 m farther along.
   const auto cloud_of = [&](std::size_t i) {
     const bool wrong = i > 160 && i % 8 == 0;
-    return seen_from(world_, wrong ? truth_[i] * Pose({}, {1.5, 0.0, 0.0}) : truth_[i]);
+    return seen_from(world_, wrong ? truth_[i] * moved_by({1.5, 0.0, 0.0}) : truth_[i]);
   };
   const CorrectedPast past = correct_past(input_, cloud_of);
   EXPECT_LT(gap_between_laps_m(truth_, past), kSameSurface_m);
@@ -199,7 +201,7 @@ TEST_F(TwoLaps, of_two_sessions_land_on_each_other) {
   GraphInput other = driven_with_drift(second, -1e-4, Vector3d::Zero());
   align(both, {});
   align(other, {0.01, {-3.6, 0.9, 0.4}, {0.0, 0.0}});  // GPS of another day: half a metre off
-  merge_sessions(both, other, Pose({}, {4.0, -1.0, -0.5}));
+  merge_sessions(both, other, moved_by({4.0, -1.0, -0.5}));
   EXPECT_EQ(both.keyframes.back().odom_epoch, 1U);
   const CorrectedPast past =
       correct_past(both, [&](std::size_t i) { return seen_from(world_, truth_[i]); });
@@ -211,24 +213,24 @@ TEST(CorrectedTrajectory, goes_over_from_one_keyframe_to_the_next) {
   GraphInput input = driven_with_drift(straight(3), 0.0, Vector3d::Zero());
   CorrectedPast past;
   past.T_map_base = {
-      Pose({}, {0.0, 0.0, 0.0}), Pose({}, {1.0, 0.4, 0.0}), Pose({}, {2.0, 0.4, 0.0})};
+      moved_by({0.0, 0.0, 0.0}), moved_by({1.0, 0.4, 0.0}), moved_by({2.0, 0.4, 0.0})};
   const std::vector<MapSample> samples = corrected_trajectory(input, past);
-  ASSERT_EQ(samples.size(), 8U);
-  EXPECT_EQ(samples[1].stamp_ns, kSecond / 2);
-  EXPECT_LT((samples[1].T_map_base.p - Vector3d(0.5, 0.2, 0.0)).norm(), 1e-12);
-  EXPECT_LT((samples[3].T_map_base.p - Vector3d(1.0, 0.4, 0.0)).norm(), 1e-12);
-  EXPECT_LT((samples[5].T_map_base.p - Vector3d(1.5, 0.4, 0.0)).norm(), 1e-12);
+  ASSERT_EQ(samples.size(), 9U);
+  EXPECT_EQ(samples[2].stamp_ns, kSecond / 2);
+  EXPECT_LT((samples[2].T_map_base.p - Vector3d(0.5, 0.2, 0.0)).norm(), 1e-12);
+  EXPECT_LT((samples[4].T_map_base.p - Vector3d(1.0, 0.4, 0.0)).norm(), 1e-12);
+  EXPECT_LT((samples[6].T_map_base.p - Vector3d(1.5, 0.4, 0.0)).norm(), 1e-12);
 }
 
 TEST(CorrectedTrajectory, leaves_out_an_epoch_that_nothing_ties_to_the_map) {
   GraphInput input = driven_with_drift(straight(20), 0.0, Vector3d::Zero());
   align(input, {});
   GraphInput unaligned = driven_with_drift(straight(5), 0.0, Vector3d::Zero());
-  merge_sessions(input, unaligned, {});
+  merge_sessions(input, unaligned, Pose{});
   const CorrectedPast past = correct_past(input, no_cloud, without_loops());
   EXPECT_EQ(past.report.keyframes_left_out, 5U);
   EXPECT_FALSE(past.T_map_base.back().has_value());
-  EXPECT_EQ(corrected_trajectory(input, past).size(), 4U * 19U);
+  EXPECT_EQ(corrected_trajectory(input, past).size(), 4U * 19U + 1U);
 }
 
 TEST(FitCloud, finds_a_known_displacement) {
@@ -277,7 +279,7 @@ TEST(FitCloud, says_that_a_corridor_leaves_its_own_direction_free) {
   }
   const auto map = make_surfel_map({});
   map->insert(corridor);
-  const auto found = fit_cloud(points, *map, Pose({}, {0.3, 0.1, 1.0}));
+  const auto found = fit_cloud(points, *map, moved_by({0.3, 0.1, 1.0}));
   ASSERT_TRUE(found.has_value());
   EXPECT_GT(std::sqrt(found->covariance(0, 0)), 1.0);
   EXPECT_LT(std::sqrt(found->covariance(1, 1)), 0.05);
@@ -298,8 +300,8 @@ TEST(PoseGraphSolver, weighs_two_measurements_by_their_information) {
   const auto covariance = [](double sigma) {
     return Eigen::Matrix<double, 6, 6>(sigma * sigma * Eigen::Matrix<double, 6, 6>::Identity());
   };
-  graph.priors.push_back({0, Pose({}, {0.0, 0.0, 0.0}), covariance(1.0)});
-  graph.priors.push_back({0, Pose({}, {5.0, 0.0, 0.0}), covariance(0.5)});
+  graph.priors.push_back({0, moved_by({0.0, 0.0, 0.0}), covariance(1.0)});
+  graph.priors.push_back({0, moved_by({5.0, 0.0, 0.0}), covariance(0.5)});
   std::vector<Pose> nodes(1);
   solve(graph, nodes);
   EXPECT_NEAR(nodes[0].p.x(), 4.0, 1e-6);  // (0 / 1 + 5 / 0.25) / (1 + 1 / 0.25)

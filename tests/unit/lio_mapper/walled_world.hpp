@@ -14,6 +14,10 @@
 
 namespace trigpoint::lio_mapper::test {
 
+inline Pose moved_by(const Eigen::Vector3d& p) {
+  return {Eigen::Quaterniond::Identity(), p};
+}
+
 /// Walls of 4 m by 3 m at random places and headings, and the ground, within `half_side_m`.
 inline std::vector<Eigen::Vector3d> walled_world(double half_side_m, unsigned seed) {
   std::mt19937 random(seed);
@@ -80,6 +84,9 @@ inline GraphInput driven_with_drift(const std::vector<Pose>& truth,
     }
     const auto stamp_ns = static_cast<Nanoseconds>(i) * kNanosecondsPerSecond;
     input.keyframes.push_back({stamp_ns, 0, T_odom_base, false, {}});
+    if (i == 0) {
+      input.trajectory.push_back({0, 0, T_odom_base});
+    }
     for (int part = 0; part < 4 && i > 0; ++part) {  // four samples a second, the last at the pose
       const double fraction = 0.25 * (part + 1);
       input.trajectory.push_back(

@@ -17,12 +17,12 @@ namespace trigpoint::lio_mapper {
 
 struct SeeThroughOptions {
   double voxel_m{0.2};
-  double range_m{30.0};       ///< farther voxels are not judged by a scan
-  double ray_radius_m{0.12};  ///< a ray that passes a voxel's points nearer than this goes through
+  double range_m{20.0};       ///< farther voxels are not judged by a scan
+  double ray_radius_m{0.08};  ///< a ray that passes a voxel's points nearer than this goes through
   double margin_m{0.4};       ///< and ends farther behind them than this
-  double least_incidence{0.2};  ///< sine against the voxel's plane; flatter rays skim it
+  double least_incidence{0.3};  ///< sine against the voxel's plane; flatter rays skim it
   std::size_t least_views{2};   ///< that go through
-  double views_per_hit{1.0};    ///< scans that go through against scans that hit
+  double views_per_hit{1.5};    ///< scans that go through against scans that hit
 };
 
 /// Two passes over all scans, then questions. Memory grows with the voxels that hold points (about
