@@ -56,6 +56,13 @@ struct Voxel {
   Eigen::Vector3f normal{Eigen::Vector3f::Zero()};
 };
 
+/// Voxels near each other, and where their points are: most are asked for no more than that.
+struct Block {
+  std::vector<std::uint32_t> voxels;
+  std::vector<Eigen::Vector3f> means_m;  ///< about the block's first voxel; of the second pass
+  Vector3d origin_m{Vector3d::Zero()};
+};
+
 struct Ray {
   Eigen::Vector3f direction{Eigen::Vector3f::Zero()};
   float range_m{0.0F};  ///< 0: none
@@ -106,7 +113,7 @@ struct SeeThrough::Impl {
     const auto [place, is_new] =
         index.try_emplace(voxel_key(i), static_cast<std::uint32_t>(voxels.size()));
     if (is_new) {
-      blocks[block_key_of(p)].push_back(static_cast<std::uint32_t>(voxels.size()));
+      blocks[block_key_of(p)].voxels.push_back(static_cast<std::uint32_t>(voxels.size()));
       voxels.emplace_back().index = i;
     }
     return &voxels[place->second];
@@ -218,49 +225,62 @@ struct SeeThrough::Impl {
 
   /// Whether the scan looks through the voxel: a ray does, and none ends in it or before it. Only
   /// pixels that a ray within the radius may lie in are asked.
-  bool is_looked_through(Voxel& voxel, const Vector3d& mean_m, double range_m) {
-    const double aside_rad = options.ray_radius_m / range_m;
-    const double level_m = std::max(mean_m.head<2>().norm(), options.ray_radius_m);
-    const double aside_azimuth_rad = options.ray_radius_m / level_m;
-    const double azimuth = std::atan2(mean_m.y(), mean_m.x());
-    const double elevation = std::atan2(mean_m.z(), level_m);
-    const int first_row = row_of(elevation - aside_rad);
-    const int last_row = row_of(elevation + aside_rad);
-    const int first_column = column_of(azimuth - aside_azimuth_rad);
-    const int last_column = column_of(azimuth + aside_azimuth_rad);
+  bool is_looked_through(std::uint32_t voxel, const Eigen::Vector3f& mean_m, float range_m) {
+    const auto radius_m = static_cast<float>(options.ray_radius_m);
+    const float level_m = std::max(mean_m.head<2>().norm(), radius_m);
+    const float azimuth = std::atan2(mean_m.y(), mean_m.x());
+    const float elevation = std::atan2(mean_m.z(), level_m);
+    const int first_row = row_of(elevation - radius_m / range_m);
+    const int last_row = row_of(elevation + radius_m / range_m);
+    const int first_column = column_of(azimuth - radius_m / level_m);
+    const int last_column = column_of(azimuth + radius_m / level_m);
     bool through = false;
     for (int row = first_row; row <= last_row; ++row) {
       for (int column = first_column; column <= last_column; ++column) {
         const Ray& ray = pixel((column + kColumns) % kColumns, row);
-        if (ray.range_m == 0.0F) {
+        const float along_m = ray.direction.dot(mean_m);
+        const float aside2 = range_m * range_m - along_m * along_m;
+        if (ray.range_m == 0.0F || aside2 > radius_m * radius_m) {
           continue;
         }
-        const double along_m = ray.direction.cast<double>().dot(mean_m);
-        const double aside2 = range_m * range_m - along_m * along_m;
-        if (aside2 > options.ray_radius_m * options.ray_radius_m) {
-          continue;
-        }
-        if (ray.range_m < along_m + options.margin_m) {
+        if (ray.range_m < along_m + static_cast<float>(options.margin_m)) {
           return false;
         }
-        through = through || goes_through(voxel, mean_m, ray);
+        through = through || goes_through(voxels[voxel], mean_m.cast<double>(), ray);
       }
     }
     return through;
   }
 
-  void look_at(Voxel& voxel, const Vector3d& origin_m) {
-    const Vector3d mean_m = mean_of(voxel) - origin_m;
-    const double range_m = mean_m.norm();
-    if (range_m > kNearest_m && range_m < options.range_m &&
-        is_looked_through(voxel, mean_m, range_m)) {
-      voxel.views = one_more(voxel.views);
+  void look_at(const Block& block, const Vector3d& origin_map_m) {
+    const Eigen::Vector3f origin_m = (origin_map_m - block.origin_m).cast<float>();
+    const auto nearest2 = static_cast<float>(kNearest_m * kNearest_m);
+    const auto farthest2 = static_cast<float>(options.range_m * options.range_m);
+    for (std::size_t i = 0; i < block.voxels.size(); ++i) {
+      const Eigen::Vector3f mean_m = block.means_m[i] - origin_m;
+      const float range2 = mean_m.squaredNorm();
+      if (range2 > nearest2 && range2 < farthest2 &&
+          is_looked_through(block.voxels[i], mean_m, std::sqrt(range2))) {
+        Voxel& voxel = voxels[block.voxels[i]];
+        voxel.views = one_more(voxel.views);
+      }
     }
   }
 
-  std::vector<const std::vector<std::uint32_t>*> blocks_near(const Vector3d& origin_m) const {
+  void find_means() {
+    for (auto block = blocks.begin(); block != blocks.end(); ++block) {
+      Block& b = block.value();
+      b.origin_m = centre_of(voxels[b.voxels.front()].index);
+      for (const std::uint32_t voxel : b.voxels) {
+        b.means_m.push_back((mean_of(voxels[voxel]) - b.origin_m).cast<float>());
+      }
+    }
+    has_means = true;
+  }
+
+  std::vector<const Block*> blocks_near(const Vector3d& origin_m) const {
     const int reach = static_cast<int>(std::ceil(options.range_m / kBlock_m));
-    std::vector<const std::vector<std::uint32_t>*> near;
+    std::vector<const Block*> near;
     for (int dx = -reach; dx <= reach; ++dx) {
       for (int dy = -reach; dy <= reach; ++dy) {
         const auto block = blocks.find(block_key_of(origin_m + kBlock_m * Vector3d(dx, dy, 0.0)));
@@ -300,7 +320,8 @@ struct SeeThrough::Impl {
   double inverse_voxel_per_m;
   std::vector<Voxel> voxels;
   tsl::robin_map<VoxelKey, std::uint32_t, VoxelKeyHash> index;
-  tsl::robin_map<VoxelKey, std::vector<std::uint32_t>, VoxelKeyHash> blocks;
+  tsl::robin_map<VoxelKey, Block, VoxelKeyHash> blocks;
+  bool has_means{false};
   std::vector<Ray> image;
   Workers workers{kThreads};
   std::size_t scans{0};
@@ -333,11 +354,12 @@ void SeeThrough::add(const PointCloud& points_map) {
 
 void SeeThrough::look(const PointCloud& points_map, const Vector3d& origin_map_m) {
   impl_->draw(points_map, origin_map_m);
-  const std::vector<const std::vector<std::uint32_t>*> near = impl_->blocks_near(origin_map_m);
+  if (!impl_->has_means) {
+    impl_->find_means();
+  }
+  const std::vector<const Block*> near = impl_->blocks_near(origin_map_m);
   impl_->workers.run(near.size(), [&](std::size_t i) {  // a voxel is of one block only
-    for (const std::uint32_t voxel : *near[i]) {
-      impl_->look_at(impl_->voxels[voxel], origin_map_m);
-    }
+    impl_->look_at(*near[i], origin_map_m);
   });
 }
 
