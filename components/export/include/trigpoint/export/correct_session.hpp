@@ -40,4 +40,18 @@ lio_mapper::PoseGraphReport correct_session(const std::string& session,
 /// What correct_session left in keyframes.tum; nothing without the file.
 std::optional<CorrectedPoses> read_corrected(const std::string& session);
 
+struct MergeReport {
+  lio_mapper::PoseGraphReport graph;
+  std::size_t loops_between{0};  ///< of them, from one session to the other
+};
+
+/// Two independent sessions in one graph, each with its own GPS rows, in the map of the first (its
+/// datum). Writes map.pcd, datum.yaml, first.tum and second.tum (every sweep) into `out`. Throws
+/// std::runtime_error naming the file and the cause, e.g. a session without a datum.
+MergeReport merge_sessions(const std::string& first,
+                           const std::string& second,
+                           const std::string& out,
+                           double voxel_m,
+                           const std::function<void(double)>& progress = {});
+
 }  // namespace trigpoint::exporter
