@@ -12,6 +12,8 @@
 #include <filesystem>
 #include <iostream>
 #include <optional>
+#include <stdexcept>
+#include <string>
 
 namespace trigpoint::cli {
 
@@ -31,12 +33,7 @@ std::optional<Alignment> alignment_of(const std::string& session) {
   return exporter::read_alignment(path).alignment;
 }
 
-void correct(const std::string& session) {
-  lio_mapper::PoseGraphReport past;
-  {
-    Progress progress("correcting the past");
-    past = exporter::correct_session(session, [&](double share) { progress(share); });
-  }
+void tell(const lio_mapper::PoseGraphReport& past) {
   std::cerr << "pose graph: " << past.keyframes << " keyframes, " << past.rows << " GPS rows ("
             << past.rows_doubted << " doubted), " << past.loops << " loop closures";
   for (const NamedCount& refused : past.loops_refused) {
@@ -44,6 +41,23 @@ void correct(const std::string& session) {
   }
   std::cerr << "; largest correction " << past.largest_correction_m << " m"
             << (past.converged || past.keyframes == 0 ? "" : "; did not converge") << "\n";
+}
+
+/// A file that is damaged costs the correction, not the map.
+void correct(const std::string& session) {
+  std::optional<lio_mapper::PoseGraphReport> past;
+  std::string failure;
+  try {
+    Progress progress("correcting the past");
+    past = exporter::correct_session(session, [&](double share) { progress(share); });
+  } catch (const std::runtime_error& error) {
+    failure = error.what();
+  }
+  if (past) {
+    tell(*past);
+  } else {
+    std::cerr << "the past is not corrected: " << failure << "\n";
+  }
 }
 
 void render_map(const std::string& session) {

@@ -29,6 +29,10 @@ constexpr double kEdgeRotation_rad = 5e-5;
 /// Keyframes are a metre apart or less; a longer step was driven blind.
 constexpr double kBlindStep_m = 3.0;
 constexpr double kBlindShare = 0.1;  // of the step, in position; a tenth of it in rad
+/// The track was found again after a restart, by registration.
+constexpr Nanoseconds kRestart_ns = 30 * kNanosecondsPerSecond;
+constexpr double kFoundAgain_m = 0.1;
+constexpr double kFoundAgain_rad = 5e-3;
 constexpr Nanoseconds kLongestGap_ns = kNanosecondsPerSecond / 2;
 /// Fewer rows do not hold an epoch.
 constexpr std::size_t kFewestRows = 10;
@@ -92,19 +96,27 @@ std::optional<FirstAlignment> first_alignment_of(const GraphInput& input, const 
 }
 
 RelativeFactor edge_between(const GraphInput& input, std::size_t i, const DriftConfig& drift) {
-  const Pose& a = input.keyframes[i].T_odom_base;
-  const Pose& b = input.keyframes[i + 1].T_odom_base;
-  const double distance_m = (b.p - a.p).norm();
-  const auto variance = [&](double noise, double per_root_metre, double blind) {
-    const double blindly = distance_m > kBlindStep_m ? blind * distance_m : 0.0;
-    return noise * noise + per_root_metre * per_root_metre * distance_m + blindly * blindly;
+  const GraphKeyframe& from = input.keyframes[i];
+  const GraphKeyframe& to = input.keyframes[i + 1];
+  const double distance_m = (to.T_odom_base.p - from.T_odom_base.p).norm();
+  const bool blind = distance_m > kBlindStep_m;
+  const bool found_again = to.stamp_ns - from.stamp_ns > kRestart_ns;
+  const auto variance = [&](double noise, double per_root_metre, double blind_share, double again) {
+    const double blindly = blind ? blind_share * distance_m : 0.0;
+    const double after_restart = found_again ? again : 0.0;
+    return noise * noise + per_root_metre * per_root_metre * distance_m + blindly * blindly +
+           after_restart * after_restart;
   };
-  RelativeFactor edge{i, i + 1, a.inverse() * b, Matrix6d::Zero()};
+  RelativeFactor edge{i, i + 1, from.T_odom_base.inverse() * to.T_odom_base, Matrix6d::Zero()};
   edge.covariance.topLeftCorner<3, 3>() =
-      variance(kEdgePosition_m, drift.position_sigma_m_sqrtm, kBlindShare) * Matrix3d::Identity();
-  const double tilt = variance(kEdgeRotation_rad, drift.tilt_sigma_rad_sqrtm, 0.01 * kBlindShare);
-  const double yaw = variance(kEdgeRotation_rad, drift.yaw_sigma_rad_sqrtm, 0.1 * kBlindShare);
-  const Matrix3d R = b.q.toRotationMatrix();  // odom is level to a fraction of a degree
+      variance(kEdgePosition_m, drift.position_sigma_m_sqrtm, kBlindShare, kFoundAgain_m) *
+      Matrix3d::Identity();
+  const double tilt =
+      variance(kEdgeRotation_rad, drift.tilt_sigma_rad_sqrtm, 0.01 * kBlindShare, kFoundAgain_rad);
+  const double yaw =
+      variance(kEdgeRotation_rad, drift.yaw_sigma_rad_sqrtm, 0.1 * kBlindShare, kFoundAgain_rad);
+  const Matrix3d R =
+      to.T_odom_base.q.toRotationMatrix();  // odom is level to a fraction of a degree
   edge.covariance.bottomRightCorner<3, 3>() =
       R.transpose() * Vector3d(tilt, tilt, yaw).asDiagonal() * R;
   return edge;
