@@ -188,6 +188,10 @@ TEST_F(TwoLaps, do_not_believe_a_place_that_only_looks_like_another) {
   };
   const CorrectedPast past = correct_past(input_, cloud_of);
   EXPECT_LT(gap_between_laps_m(truth_, past), kSameSurface_m);
+  // Seen from their neighbours alone, before the graph is asked.
+  EXPECT_TRUE(std::any_of(past.report.loops_refused.begin(),
+                          past.report.loops_refused.end(),
+                          [](const NamedCount& reason) { return reason.name == "inconsistent"; }));
   for (const Loop& loop : past.loops) {
     const Pose expected = truth_[loop.earlier].inverse() * truth_[loop.later];
     EXPECT_LT((loop.T_earlier_later.p - expected.p).norm(), 0.1);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <random>
 #include <vector>
 
 namespace trigpoint::lio_mapper {
@@ -17,6 +18,8 @@ using Eigen::Vector3d;
 constexpr double kSensor_m = 1.4;  // above the ground
 constexpr double kWall_y_m = 8.0;
 constexpr double kBox_y_m = 4.0;
+constexpr double kNoise_m = 0.02;
+constexpr double kSurface_m = 4.0 * kNoise_m;
 
 /// Ground, a wall along x, a thin pole before it and, when there, an upright board: by rays of 16
 /// rings, as a spinning LiDAR sends them from (x, 0).
@@ -56,6 +59,8 @@ struct Street {
   }
 
   static PointCloud scan(double x_m, double board_x_m) {
+    std::mt19937 random(static_cast<unsigned>(x_m));
+    std::normal_distribution<double> noise_m(0.0, kNoise_m);
     const Vector3d o(x_m, 0.0, kSensor_m);
     PointCloud cloud;
     for (int ring = -15; ring <= 15; ring += 2) {
@@ -65,7 +70,7 @@ struct Street {
         const Vector3d d(std::cos(e) * std::cos(a), std::cos(e) * std::sin(a), std::sin(e));
         const double range = range_m(o, d, board_x_m);
         if (range < 50.0) {
-          const Eigen::Vector3f p = (o + range * d).cast<float>();
+          const Eigen::Vector3f p = (o + (range + noise_m(random)) * d).cast<float>();
           cloud.push_back({p.x(), p.y(), p.z(), 0.0F});
         }
       }
@@ -107,10 +112,10 @@ class SeeThroughStreet : public testing::Test {
 
   Kind& kind_of(const PointXyzi& p) {
     const double to_pole = std::hypot(p.x - Street::kPole_x_m, p.y - Street::kPole_y_m);
-    return to_pole < Street::kPole_m + 0.01                ? pole_
-           : std::abs(p.y - kBox_y_m) < 0.01 && p.z > 0.01 ? board_
-           : p.z < 0.01                                    ? ground_
-                                                           : wall_;
+    return to_pole < Street::kPole_m + kSurface_m                      ? pole_
+           : std::abs(p.y - kBox_y_m) < kSurface_m && p.z > kSurface_m ? board_
+           : p.z < kSurface_m                                          ? ground_
+                                                                       : wall_;
   }
 
   Kind board_;
