@@ -22,7 +22,7 @@ GENERATED = r"(builtin_interfaces|std_msgs|geometry_msgs|nav_msgs|sensor_msgs|tf
 DDS_HEADER = re.compile(rf"^(fastdds/|fastrtps/|fastcdr/|dds/|ddsc/|{GENERATED}$)")
 # Headers of the bus that bring generated types along are for process shells too.
 TYPED_BUS_HEADER = re.compile(r"^trigpoint/bus/(bus|backend|convert|topics)\.hpp$")
-HEAVY_HEADER = re.compile(r"^(pcl/|yaml-cpp/|spdlog/|sqlite3|rosbag/|GeographicLib/|nlohmann/|gdal|ogr_|boost/|CLI/)")
+HEAVY_HEADER = re.compile(r"^(pcl/|yaml-cpp/|spdlog/|sqlite3|rosbag/|GeographicLib/|nlohmann/|ceres/|gdal|ogr_|boost/|CLI/)")
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.MULTILINE)
 MACHINE_PATH = re.compile(r"(?<![\w.$}{/-])/(work|root)/[\w.]")
 SPDX = "SPDX-License-Identifier: Apache-2.0"

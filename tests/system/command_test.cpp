@@ -94,6 +94,7 @@ TEST(Command, every_verb_has_help) {
                            "evaluate",
                            "report",
                            "export",
+                           "merge",
                            "gps-plots",
                            "config",
                            "doctor"}) {

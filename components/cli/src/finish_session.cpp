@@ -3,6 +3,7 @@
 #include "finish_session.hpp"
 
 #include "trigpoint/evaluation/report.hpp"
+#include "trigpoint/export/correct_session.hpp"
 #include "trigpoint/export/map.hpp"
 #include "trigpoint/export/session.hpp"
 
@@ -11,6 +12,8 @@
 #include <filesystem>
 #include <iostream>
 #include <optional>
+#include <stdexcept>
+#include <string>
 
 namespace trigpoint::cli {
 
@@ -30,18 +33,53 @@ std::optional<Alignment> alignment_of(const std::string& session) {
   return exporter::read_alignment(path).alignment;
 }
 
+void tell(const lio_mapper::PoseGraphReport& past) {
+  std::cerr << "pose graph: " << past.keyframes << " keyframes, " << past.rows << " GPS rows ("
+            << past.rows_doubted << " doubted), " << past.loops << " loop closures";
+  for (const NamedCount& refused : past.loops_refused) {
+    std::cerr << ", " << refused.count << " refused as " << refused.name;
+  }
+  std::cerr << "; largest correction " << past.largest_correction_m << " m"
+            << (past.converged || past.keyframes == 0 ? "" : "; did not converge") << "\n";
+}
+
+/// A file that is damaged costs the correction, not the map.
+void correct(const std::string& session) {
+  std::optional<lio_mapper::PoseGraphReport> past;
+  std::string failure;
+  try {
+    Progress progress("correcting the past");
+    past = exporter::correct_session(session, [&](double share) { progress(share); });
+  } catch (const std::runtime_error& error) {
+    failure = error.what();
+  }
+  if (past) {
+    tell(*past);
+  } else {
+    std::cerr << "the past is not corrected: " << failure << "\n";
+  }
+}
+
 void render_map(const std::string& session) {
   const std::string keyframes = path_in(session, file::kKeyframes);
   if (!fs::exists(keyframes)) {
     std::cerr << "no keyframes in " << session << ": no map\n";
     return;
   }
+  correct(session);
+  const std::optional<exporter::CorrectedPoses> corrected = exporter::read_corrected(session);
   Progress progress("rendering the map");
-  const exporter::MapReport map = exporter::render_map(keyframes,
-                                                       alignment_of(session),
-                                                       kMapVoxel_m,
-                                                       path_in(session, file::kMap),
-                                                       [&](double share) { progress(share); });
+  const exporter::MapReport map =
+      exporter::render_map(keyframes,
+                           alignment_of(session),
+                           kMapVoxel_m,
+                           path_in(session, file::kMap),
+                           [&](double share) { progress(share); },
+                           {corrected ? &*corrected : nullptr,
+                            true,
+                            exporter::past_settings_of(session).lidar_position_base_m});
+  std::cerr << "map: " << map.points_moving << " of " << map.points_read
+            << " points are of moving objects and left out\n";
   if (!map.remark.empty()) {
     std::cerr << "map: " << map.remark << "\n";
   }

@@ -81,6 +81,7 @@ int main(int argc, char** argv) {
   cli::add_evaluate(app, chosen);
   cli::add_report(app, chosen);
   cli::add_export(app, chosen);
+  cli::add_merge(app, chosen);
   cli::add_gps_plots(app, chosen);
   cli::add_config(app, chosen);
   cli::add_doctor(app, chosen);

@@ -23,6 +23,7 @@ void add_export(CLI::App& app, Chosen& chosen);
 void add_gps_plots(CLI::App& app, Chosen& chosen);
 void add_info(CLI::App& app, Chosen& chosen);
 void add_map(CLI::App& app, Chosen& chosen);
+void add_merge(CLI::App& app, Chosen& chosen);
 void add_play(CLI::App& app, Chosen& chosen);
 void add_record(CLI::App& app, Chosen& chosen);
 void add_report(CLI::App& app, Chosen& chosen);

@@ -108,8 +108,10 @@ std::string place_of_map(const SessionData& data, const std::string& pcd) {
     return "Its frame is map, by the alignment that the mapper had; no " +
            std::string(file::kAlignment) + " was left.";
   }
+  const bool corrected = std::filesystem::exists(data.path(file::kKeyframePoses));
   return data.alignment->admitted
-             ? "Its frame is map, placed with the alignment above."
+             ? corrected ? "Its frame is map, every keyframe placed by the pose graph."
+                         : "Its frame is map, placed with the alignment above."
              : "Placed with the alignment above, which the gate has **not admitted**: neither its "
                "place nor its direction can be relied on.";
 }

@@ -2,6 +2,7 @@
 // Copyright the Trigpoint developers
 #include "trigpoint/export/export_session.hpp"
 
+#include "trigpoint/export/correct_session.hpp"
 #include "trigpoint/export/session.hpp"
 
 #include <algorithm>
@@ -66,7 +67,15 @@ void export_pcd(const std::string& session,
     if (fs::exists(alignment)) {
       fallback = read_alignment(alignment).alignment;
     }
-    report.map = render_map(keyframes, fallback, voxel_m, target, progress);
+    const std::optional<CorrectedPoses> corrected = read_corrected(session);
+    report.map = render_map(keyframes,
+                            fallback,
+                            voxel_m,
+                            target,
+                            progress,
+                            {corrected ? &*corrected : nullptr,
+                             corrected.has_value(),
+                             past_settings_of(session).lidar_position_base_m});
     report.written.push_back({target,
                               "frame " + report.map.frame + ", " +
                                   std::to_string(report.map.points_written) + " points"});

@@ -10,13 +10,15 @@ MapReport render_map(const std::string& keyframes_file,
                      const std::optional<Alignment>& fallback,
                      double voxel_m,
                      const std::string& out_pcd,
-                     const std::function<void(double)>& progress) {
+                     const std::function<void(double)>& progress,
+                     const MapCorrections& corrections) {
   return render_keyframes(
       [&](const auto& visit) { lio_mapper::read_keyframes(keyframes_file, visit); },
       fallback,
       voxel_m,
       out_pcd,
-      progress);
+      progress,
+      corrections);
 }
 
 }  // namespace trigpoint::exporter

@@ -11,7 +11,7 @@
 
 namespace trigpoint::exporter {
 
-/// Calls its argument with every keyframe in order of time; may be called twice.
+/// Calls its argument with every keyframe in order of time; is called several times.
 using KeyframeSource =
     std::function<void(const std::function<void(const lio_mapper::Keyframe&)>& visit)>;
 
@@ -20,6 +20,7 @@ MapReport render_keyframes(const KeyframeSource& keyframes,
                            const std::optional<Alignment>& fallback,
                            double voxel_m,
                            const std::string& out_pcd,
-                           const std::function<void(double)>& progress);
+                           const std::function<void(double)>& progress,
+                           const MapCorrections& corrections = {});
 
 }  // namespace trigpoint::exporter

@@ -17,6 +17,9 @@ constexpr const char* kColumns =
     "SELECT id, stamp_ns, odom_epoch, T_odom_base, pose_covariance, aligned, T_map_odom, "
     "points_base FROM keyframes ";
 
+/// A blob that nobody asks for stays on the disk.
+enum class Clouds { kRead, kLeave };
+
 Database opened(const std::string& file) {
   if (!std::filesystem::exists(file)) {
     throw std::runtime_error(file + ": keyframe store: no such file");
@@ -65,7 +68,7 @@ struct KeyframeReader::Impl {
     }
   }
 
-  Keyframe keyframe_of(const Statement& row) const {
+  Keyframe keyframe_of(const Statement& row, Clouds clouds = Clouds::kRead) const {
     Keyframe keyframe;
     keyframe.id = static_cast<std::uint64_t>(row.integer(0));
     keyframe.stamp_ns = row.integer(1);
@@ -78,7 +81,9 @@ struct KeyframeReader::Impl {
     store::YawPoseNumbers yaw_pose{};
     row.copy(6, yaw_pose.data(), sizeof yaw_pose);
     keyframe.T_map_odom = store::yaw_pose_of(yaw_pose);
-    keyframe.points_base = points_of(row, keyframe.id);
+    if (clouds == Clouds::kRead) {
+      keyframe.points_base = points_of(row, keyframe.id);
+    }
     if (!keyframe.T_odom_base.is_finite() || !keyframe.T_map_odom.pose().is_finite()) {
       row.fail("keyframe " + std::to_string(keyframe.id) + " has a pose that is not finite");
     }
@@ -169,8 +174,18 @@ struct KeyframeReader::Impl {
     return c;
   }
 
+  /// The small columns alone: clouds lie in pages of their own.
+  void look_up_order() {
+    order.emplace();
+    Statement found(database, "SELECT row FROM keyframes ORDER BY stamp_ns, row");
+    while (found.step()) {
+      order->push_back(found.integer(0));
+    }
+  }
+
   Database database;
   std::int64_t version{0};
+  std::optional<std::vector<std::int64_t>> order;  ///< row numbers by time
 };
 
 KeyframeReader::KeyframeReader(const std::string& file) : impl_(std::make_unique<Impl>(file)) {}
@@ -182,6 +197,19 @@ std::uint64_t KeyframeReader::visit(const std::function<void(const Keyframe&)>& 
   std::uint64_t count = 0;
   while (rows.step()) {
     visit(impl_->keyframe_of(rows));
+    ++count;
+  }
+  return count;
+}
+
+std::uint64_t KeyframeReader::visit_places(const std::function<void(const Keyframe&)>& visit) {
+  // Sorting must not carry the clouds along.
+  Statement rows(impl_->database,
+                 "SELECT id, stamp_ns, odom_epoch, T_odom_base, pose_covariance, aligned, "
+                 "T_map_odom, NULL FROM keyframes ORDER BY stamp_ns, row");
+  std::uint64_t count = 0;
+  while (rows.step()) {
+    visit(impl_->keyframe_of(rows, Clouds::kLeave));
     ++count;
   }
   return count;
@@ -202,6 +230,18 @@ std::uint64_t KeyframeReader::visit(const MapRegion& region,
     }
   }
   return rows.size();
+}
+
+std::optional<Keyframe> KeyframeReader::at(std::size_t place) {
+  if (!impl_->order) {
+    impl_->look_up_order();
+  }
+  if (place >= impl_->order->size()) {
+    return std::nullopt;
+  }
+  Statement one(impl_->database, std::string(kColumns) + "WHERE row = ?1");
+  one.bind(1, (*impl_->order)[place]);
+  return one.step() ? std::optional(impl_->keyframe_of(one)) : std::nullopt;
 }
 
 std::uint64_t KeyframeReader::visit_rows(const std::function<void(const StoredRow&)>& visit) {

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
+#include "trigpoint/export/correct_session.hpp"
+
 #include "render_map.hpp"
 #include "scratch_folder.hpp"
 #include <gmock/gmock.h>
@@ -40,13 +42,14 @@ Keyframe aligned(Keyframe frame, double yaw_rad, const Eigen::Vector3d& p) {
 class RenderKeyframes : public testing::Test {
  protected:
   MapReport render(const std::vector<Keyframe>& frames,
-                   const std::optional<Alignment>& fallback = {}) {
+                   const std::optional<Alignment>& fallback = {},
+                   const MapCorrections& corrections = {}) {
     const auto source = [&](const auto& visit) {
       for (const auto& frame : frames) {
         visit(frame);
       }
     };
-    return render_keyframes(source, fallback, kVoxel_m, file(), {});
+    return render_keyframes(source, fallback, kVoxel_m, file(), {}, corrections);
   }
 
   std::string file() const { return folder_.file("map.pcd"); }
@@ -108,6 +111,53 @@ TEST_F(RenderKeyframes, levels_those_before_the_alignment_about_the_place_where_
   // A metre behind the place of the alignment, 0.1 rad lower ahead of it, so higher behind it.
   EXPECT_TRUE(
       has_point(5.0F - static_cast<float>(std::cos(0.1)), 0.0F, static_cast<float>(std::sin(0.1))));
+}
+
+TEST_F(RenderKeyframes, places_each_where_the_pose_graph_has_it) {
+  CorrectedPoses corrected;
+  corrected.T_frame_base[1].p = {50.0, 0.0, 0.0};
+  const auto report = render({aligned(keyframe(1, 0, 0.0), 0.0, {10.0, 0.0, 0.0}),
+                              aligned(keyframe(2, 0, 2.0), 0.0, {10.0, 0.0, 0.0})},
+                             {},
+                             {&corrected, false, {}});
+  EXPECT_TRUE(has_point(51.0F, 0.0F, 0.0F));
+  EXPECT_EQ(report.points_written, 1U);
+  EXPECT_EQ(report.keyframes_left_out, 1U);
+}
+
+/// A wall 10 m ahead of a robot that stands, and in some scans a board at 5 m before it.
+Keyframe wall_with_board(Nanoseconds stamp_ns, bool with_board) {
+  Keyframe frame = aligned(keyframe(stamp_ns, 0, 0.0), 0.0, {});
+  frame.T_map_odom.p.setZero();
+  frame.points_base.clear();
+  for (int azimuth = -20; azimuth <= 20; ++azimuth) {
+    for (int elevation = -5; elevation <= 5; ++elevation) {
+      const double y = std::tan(azimuth * 0.01);
+      const double z = std::tan(elevation * 0.03);
+      const double range_m = with_board && std::abs(azimuth) < 8 ? 5.0 : 10.0;
+      frame.points_base.push_back({static_cast<float>(range_m),
+                                   static_cast<float>(range_m * y),
+                                   static_cast<float>(range_m * z),
+                                   1.0F});
+    }
+  }
+  return frame;
+}
+
+TEST_F(RenderKeyframes, leaves_out_what_other_scans_look_through) {
+  std::vector<Keyframe> frames;
+  for (int i = 1; i <= 6; ++i) {
+    frames.push_back(wall_with_board(i, i == 3));
+  }
+  const auto has_board = [&] {
+    const auto cloud = read_pcd(file());
+    return std::any_of(cloud.begin(), cloud.end(), [](const auto& p) { return p.x < 6.0F; });
+  };
+  render(frames);
+  EXPECT_TRUE(has_board());
+  const auto report = render(frames, {}, {nullptr, true, Eigen::Vector3d::Zero()});
+  EXPECT_FALSE(has_board());
+  EXPECT_EQ(report.points_moving, 15U * 11U);
 }
 
 TEST_F(RenderKeyframes, leaves_out_an_epoch_that_was_never_aligned_and_says_so) {

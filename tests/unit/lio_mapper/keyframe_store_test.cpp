@@ -121,6 +121,28 @@ void write(const std::string& file, int count) {
   }
 }
 
+TEST_F(KeyframeStore, finds_a_keyframe_by_its_place_in_time_and_all_places_without_clouds) {
+  {
+    KeyframeWriter writer(file());
+    for (const int i : {0, 2, 1}) {
+      writer.append(keyframe(i));
+    }
+  }
+  KeyframeReader reader(file());
+  for (int i = 0; i < 3; ++i) {
+    const auto found = reader.at(static_cast<std::size_t>(i));
+    ASSERT_TRUE(found.has_value());
+    expect_equal(*found, keyframe(i));
+  }
+  EXPECT_FALSE(reader.at(3).has_value());
+  std::vector<Keyframe> places;
+  EXPECT_EQ(reader.visit_places([&](const Keyframe& k) { places.push_back(k); }), 3U);
+  ASSERT_EQ(places.size(), 3U);
+  for (int i = 0; i < 3; ++i) {
+    expect_equal(places[static_cast<std::size_t>(i)], keyframe(i, 0));
+  }
+}
+
 TEST_F(KeyframeStore, gives_back_what_was_written_clouds_to_half_a_millimetre) {
   write(file(), 5);
   const auto all = read_all(file());

@@ -21,11 +21,23 @@ struct MapReport {
   std::uint64_t keyframes_left_out{0};  ///< of an epoch without alignment when others have one
   std::uint64_t points_read{0};
   std::uint64_t points_written{0};
-  std::string frame{"map"};  ///< "odom" when nothing was aligned and no fallback given
+  std::uint64_t points_moving{0};  ///< of those read, taken for moving objects and left out
+  std::string frame{"map"};        ///< "odom" when nothing was aligned and no fallback given
   Eigen::Vector3d lowest_m{Eigen::Vector3d::Zero()};
   Eigen::Vector3d highest_m{Eigen::Vector3d::Zero()};
   std::string
       remark;  ///< what a reader must know, e.g. why the frame is odom; empty when all is well
+};
+
+struct CorrectedPoses;
+
+/// What the past is known better by than the keyframes themselves.
+struct MapCorrections {
+  /// Of the pose graph (correct_session.hpp). Keyframes that it does not hold are left out.
+  const CorrectedPoses* corrected{nullptr};
+  /// Points that others look through are not rendered (lio_mapper/see_through).
+  bool remove_moving{false};
+  Eigen::Vector3d lidar_position_base_m{Eigen::Vector3d::Zero()};  ///< where rays begin
 };
 
 /// Renders `keyframes_file` into the binary PCD `out_pcd` (x y z intensity, float32, m). Each
@@ -37,7 +49,8 @@ MapReport render_map(const std::string& keyframes_file,
                      const std::optional<Alignment>& fallback,
                      double voxel_m,
                      const std::string& out_pcd,
-                     const std::function<void(double)>& progress = {});
+                     const std::function<void(double)>& progress = {},
+                     const MapCorrections& corrections = {});
 
 /// Binary PCD with x y z intensity.
 void write_pcd(const std::string& file, const PointCloud& cloud);

@@ -35,6 +35,7 @@ inline constexpr const char* kGate = "gate.csv";
 inline constexpr const char* kGpsStatus = "gps_status.csv";
 inline constexpr const char* kScans = "scans.csv";
 inline constexpr const char* kKeyframes = "keyframes.sqlite";
+inline constexpr const char* kKeyframePoses = "keyframes.tum";  ///< corrected
 inline constexpr const char* kMap = "map.pcd";
 inline constexpr const char* kReport = "report.md";
 inline constexpr const char* kPlots = "plots";

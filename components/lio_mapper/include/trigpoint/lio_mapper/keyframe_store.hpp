@@ -43,8 +43,13 @@ class KeyframeReader {
 
   /// In order of time. Returns their number.
   std::uint64_t visit(const std::function<void(const Keyframe&)>& visit);
+  /// In order of time, without their points: no cloud is read.
+  std::uint64_t visit_places(const std::function<void(const Keyframe&)>& visit);
   /// Those of a region, in order of time; others are not read from the disk.
   std::uint64_t visit(const MapRegion& region, const std::function<void(const Keyframe&)>& visit);
+  /// The `place`-th in order of time, from 0; nothing beyond the last. What was appended after the
+  /// first call is not found.
+  std::optional<Keyframe> at(std::size_t place);
   /// In the order in which they were decided. Returns their number.
   std::uint64_t visit_rows(const std::function<void(const StoredRow&)>& visit);
   /// The newest; nothing when the store has none, as one of format 3.
