@@ -159,10 +159,11 @@ Datum read_datum(const std::string& file) {
 }
 
 void write_alignment(const std::string& file, const AlignmentRecord& record) {
-  const auto& [epoch, T_map_odom, covariance] = record.alignment;
+  const YawPose& T_map_odom = record.alignment.T_map_odom;
+  const Eigen::Matrix4d& covariance = record.alignment.covariance;
   std::string text =
       "# Best known T_map_odom: p_map = Rz(yaw_rad) exp((tilt_rad, 0)) p_odom + translation_m\n";
-  text += "odom_epoch: " + std::to_string(epoch);
+  text += "odom_epoch: " + std::to_string(record.alignment.odom_epoch);
   text += "\nyaw_rad: " + number_text(T_map_odom.yaw_rad);
   text += "\ntranslation_m: [" + number_text(T_map_odom.p.x()) + ", " +
           number_text(T_map_odom.p.y()) + ", " + number_text(T_map_odom.p.z()) + "]";
