@@ -204,6 +204,12 @@ std::optional<Nanoseconds> FixMonitor::taken_in_since(const Sighting& sighting,
 
 MonitorOutcome FixMonitor::judge(const Witness& witness, const LioStatus& lio) {
   Sighting sighting = sighting_of(witness);
+  // After a silence the receiver began anew, and a new solution may be as wrong as the old one: it
+  // does not overthrow an alignment by one jump.
+  if (!sightings_.empty() &&
+      to_seconds(sighting.stamp_ns - sightings_.back().stamp_ns) > kNewSolution_s) {
+    confirmed_s_ += config_.smooth.probation_s;
+  }
   MonitorOutcome outcome;
   for (const Part part : kParts) {
     const std::size_t k = index_of(part);
@@ -220,8 +226,6 @@ MonitorOutcome FixMonitor::judge(const Witness& witness, const LioStatus& lio) {
   if (outcome.trusted[0] && last_trusted_[0]) {
     const double since_s = to_seconds(sighting.stamp_ns - last_trusted_[0]->stamp_ns);
     confirmed_s_ += since_s <= kUnbrokenGap_s ? std::max(0.0, since_s) : 0.0;
-    // A receiver that lost its solution does not find the same wrong one again.
-    confirmed_s_ += since_s > kNewSolution_s ? config_.smooth.probation_s : 0.0;
   }
   for (const Part part : kParts) {
     if (outcome.trusted[index_of(part)]) {

@@ -71,7 +71,7 @@ struct MatchingConfig {
   double angle_sigma_rad{1.5e-3};  ///< beam direction and divergence: counts at grazing incidence
   double robust_width{2.0};        ///< residuals beyond this many sigmas lose weight (Huber)
   double grazing_cos{0.15};        ///< planes that the beam hits more flatly lose weight
-  double independent_residuals{100.0};  ///< residuals count as at most this many independent ones
+  double independent_residuals{200.0};  ///< residuals count as at most this many independent ones
   std::int64_t min_matches{50};
   std::int64_t max_iterations{5};
   double converged_position_m{1e-3};
@@ -97,11 +97,11 @@ struct LocalMapConfig {
 
 /// How fast odom drifts away from the truth: random walk of T_map_odom per metre driven.
 struct DriftConfig {
-  double position_sigma_m_sqrtm{0.01};
-  double yaw_sigma_rad_sqrtm{1.5e-4};
-  double tilt_sigma_rad_sqrtm{1e-4};
+  double position_sigma_m_sqrtm{0.003};
+  double yaw_sigma_rad_sqrtm{5e-5};
+  double tilt_sigma_rad_sqrtm{5e-5};
   /// Share of the pose's covariance relative to the local map that the map inherits per metre.
-  double map_renewal_per_m{0.0};
+  double map_renewal_per_m{0.2};
 };
 
 struct RowsConfig {
