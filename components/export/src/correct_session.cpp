@@ -6,6 +6,7 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
@@ -64,10 +65,12 @@ PastSettings past_settings_of(const std::string& session) {
   const YAML::Node config = YAML::LoadFile(file);
   if (const YAML::Node mapper = config["lio_mapper"]; mapper && mapper["drift"]) {
     const YAML::Node drift = mapper["drift"];
-    lio_mapper::DriftConfig& d = settings.drift;
-    d.position_sigma_m_sqrtm = drift["position_sigma_m_sqrtm"].as<double>(d.position_sigma_m_sqrtm);
-    d.yaw_sigma_rad_sqrtm = drift["yaw_sigma_rad_sqrtm"].as<double>(d.yaw_sigma_rad_sqrtm);
-    d.tilt_sigma_rad_sqrtm = drift["tilt_sigma_rad_sqrtm"].as<double>(d.tilt_sigma_rad_sqrtm);
+    const auto widen = [&](const char* key, double& sigma) {
+      sigma = std::max(sigma, drift[key].as<double>(sigma));
+    };
+    widen("position_sigma_m_sqrtm", settings.drift.position_sigma_m_sqrtm);
+    widen("yaw_sigma_rad_sqrtm", settings.drift.yaw_sigma_rad_sqrtm);
+    widen("tilt_sigma_rad_sqrtm", settings.drift.tilt_sigma_rad_sqrtm);
   }
   if (const YAML::Node robot = config["robot"]; robot && robot["lidar_position_base_m"]) {
     const auto p = robot["lidar_position_base_m"].as<std::vector<double>>();

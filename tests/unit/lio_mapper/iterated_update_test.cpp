@@ -193,6 +193,26 @@ class RoomMap final : public LocalMap {
 /// One thread; that more change nothing has a test of its own.
 Workers workers(1);
 
+/// The cone of a ring in foliage: beams that run along the plane at 1 degree against beams that hit
+/// a wall at 60 degrees.
+TEST(ScanMatcher, believes_little_of_a_plane_that_its_beams_run_along) {
+  const RoomMap map;
+  const auto information_along_z = [&](float x, double grazing_cos) {
+    PointCloud points;
+    for (int i = 0; i < 60; ++i) {
+      points.push_back({x, 0.001F * static_cast<float>(i), -1.98F, 0.0F});
+    }
+    MatchingConfig config;
+    config.grazing_cos = grazing_cos;
+    const Pose T_base_lidar{Eigen::Quaterniond::Identity(), {0.0, 0.0, -1.9}};
+    ScanMatcher matcher(points, map, T_base_lidar, config, workers);
+    return matcher.linearise(Pose{}).information(2, 2);
+  };
+  const double by_default = MatchingConfig{}.grazing_cos;
+  EXPECT_LT(information_along_z(5.0F, by_default), 0.03 * information_along_z(5.0F, 0.0));
+  EXPECT_GT(information_along_z(0.05F, by_default), 0.9 * information_along_z(0.05F, 0.0));
+}
+
 TEST(ScanMatcher, gradient_and_information_are_the_derivatives_of_the_cost) {
   PointCloud points;
   for (int i = 0; i < 30; ++i) {
@@ -222,7 +242,9 @@ TEST(ScanMatcher, gradient_and_information_are_the_derivatives_of_the_cost) {
       map.match(T * p, plane);
       const double r = plane.normal.dot(moved * p) + plane.offset_m;
       const double cos = (T.q * p.normalized()).dot(plane.normal);
-      sum += 0.5 * r * r / (1e-4 + 0.0004 * cos * cos + plane.thickness2_m2);
+      const double cos2 = cos * cos;
+      sum += 0.5 * r * r * cos2 / (cos2 + config.grazing_cos * config.grazing_cos) /
+             (1e-4 + 0.0004 * cos2 + plane.thickness2_m2);
     }
     return sum;
   };
@@ -255,6 +277,7 @@ TEST(ScanMatcher, gradient_with_extrinsic_is_the_derivative_of_the_cost) {
   const RoomMap map;
   MatchingConfig config;
   config.independent_residuals = 1e9;
+  config.grazing_cos = 0.0;
   config.robust_width = 1e9;
   config.range_sigma_m = 0.0;
   config.angle_sigma_rad = 0.0;  // weights that depend on nothing

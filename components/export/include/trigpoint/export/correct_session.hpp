@@ -23,7 +23,7 @@ struct CorrectedPoses {
 
 /// What of a session's config.yaml the past depends on; defaults where it does not say.
 struct PastSettings {
-  lio_mapper::DriftConfig drift;
+  lio_mapper::DriftConfig drift{lio_mapper::GraphInput{}.drift};
   Eigen::Vector3d lidar_position_base_m{Eigen::Vector3d::Zero()};
 };
 

@@ -43,7 +43,9 @@ struct GraphInput {
   std::vector<StoredRow> rows;           ///< refused ones are not used
   /// Of an epoch without an aligned keyframe.
   std::optional<Alignment> fallback;
-  DriftConfig drift;
+  /// Wider than what a filter is told: in places where scans hold little, more drifts, and a loop
+  /// that contradicts an edge must be able to win.
+  DriftConfig drift{0.02, 3.5e-4, 1e-4, 0.0};
 };
 
 /// Where the keyframes are before anything is solved.
