@@ -39,6 +39,7 @@ bool IkdMap::match(const Vector3d& point_odom_m, PlaneMatch& plane) const {
   plane.normal = fit->normal;
   plane.offset_m = -fit->normal.dot(fit->centroid + origin);
   plane.thickness2_m2 = thickness2_of_neighbours_m2(*fit, kPlanePoints);
+  plane.tilt2_rad2 = tilt2_rad2(*fit, plane.thickness2_m2, kPlanePoints);
   return true;
 }
 

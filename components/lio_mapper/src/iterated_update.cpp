@@ -80,6 +80,7 @@ UpdateResult iterate(const State& prior,
         -gain * (measured.gradient - measured.information * back.template head<Size>()) - back;
     result.measured = {measured.information.template topLeftCorner<error::kPose, error::kPose>(),
                        measured.gradient.template head<error::kPose>(),
+                       measured.noise,
                        measured.count};
     result.measured_at = state.T_odom_base;
     state = boxplus(state, step);

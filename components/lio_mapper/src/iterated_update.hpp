@@ -27,7 +27,10 @@ struct Information {
 
   Matrix information{Matrix::Zero()};  ///< H^T R^-1 H
   Vector gradient{Vector::Zero()};     ///< H^T R^-1 r
-  std::size_t count{0};                ///< residuals in it
+  /// What the noise of the planes' normals adds to the position's information though it tells
+  /// nothing; already taken out when the sum is complete.
+  Eigen::Matrix3d noise{Eigen::Matrix3d::Zero()};
+  std::size_t count{0};  ///< residuals in it
 };
 
 using PoseInformation = Information<error::kPose>;

@@ -18,6 +18,7 @@ struct PlaneMatch {
   Eigen::Vector3d normal{Eigen::Vector3d::UnitZ()};
   double offset_m{0.0};       ///< d
   double thickness2_m2{0.0};  ///< variance of the map's points across the plane
+  double tilt2_rad2{0.0};     ///< variance of the normal's direction, about its worse axis
 };
 
 /// What the estimator asks of a local map. All coordinates in odom.

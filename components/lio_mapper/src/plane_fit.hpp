@@ -67,6 +67,12 @@ inline constexpr double kThicknessFloor2_m2 = 2.5e-5;
 std::optional<PlaneFit> fit_neighbours(std::span<const Eigen::Vector3d> points,
                                        double max_distance_m);
 
+/// Variance of the normal about the axis of the larger tilt: `count` points of variance
+/// `thickness2_m2` across the plane on a lever whose mean square is the middle eigenvalue.
+inline double tilt2_rad2(const PlaneFit& plane, double thickness2_m2, int count) {
+  return thickness2_m2 / (count * plane.eigenvalues[1] + 1e-12);
+}
+
 /// Variance across the plane of `count` points: three of their degrees of freedom went into it.
 double thickness2_of_neighbours_m2(const PlaneFit& plane, std::size_t count);
 

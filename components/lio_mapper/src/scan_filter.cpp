@@ -29,6 +29,10 @@ constexpr double kLeastMotion_m = 0.005;
 /// Of a pose that a search found, before the scan is matched there.
 constexpr double kFoundPosition_m = 0.1;
 constexpr double kFoundRotation_rad = 0.01;
+/// What is larger stays the same error for long, as in a tunnel, and is the pose's own: passed on
+/// every metre it would leave the pose nothing to learn from GPS.
+constexpr double kMostInherited_m = 0.1;
+constexpr double kMostInherited_rad = 0.01;
 /// A scan is put into the map unmatched only while its pose relative to the map is this certain.
 constexpr double kMapSigma_m = 0.3;
 
@@ -103,12 +107,19 @@ PointCloud transformed(const PointCloud& points, const Pose& T) {
 DriftRate drift_rate(const DriftConfig& drift, const Matrix6d& local) {
   const double inherited = drift.map_renewal_per_m;
   const auto square = [](double x) { return x * x; };
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> axes(local.topLeftCorner<3, 3>());
+  const Matrix3d position_m2 =
+      axes.eigenvectors() *
+      axes.eigenvalues().cwiseMax(0.0).cwiseMin(square(kMostInherited_m)).asDiagonal() *
+      axes.eigenvectors().transpose();
+  const double most_rad2 = square(kMostInherited_rad);
   DriftRate rate;
-  rate.position_m2 = square(drift.position_sigma_m_sqrtm) * Matrix3d::Identity() +
-                     inherited * local.topLeftCorner<3, 3>();
+  rate.position_m2 =
+      square(drift.position_sigma_m_sqrtm) * Matrix3d::Identity() + inherited * position_m2;
   rate.tilt_rad2 = square(drift.tilt_sigma_rad_sqrtm) * Eigen::Matrix2d::Identity() +
-                   inherited * local.block<2, 2>(3, 3);
-  rate.yaw_rad2 = square(drift.yaw_sigma_rad_sqrtm) + inherited * local(5, 5);
+                   inherited * std::min(most_rad2, local.block<2, 2>(3, 3).trace()) *
+                       local.block<2, 2>(3, 3) / (local.block<2, 2>(3, 3).trace() + 1e-18);
+  rate.yaw_rad2 = square(drift.yaw_sigma_rad_sqrtm) + inherited * std::min(most_rad2, local(5, 5));
   return rate;
 }
 

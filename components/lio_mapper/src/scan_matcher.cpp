@@ -2,6 +2,8 @@
 // Copyright the Trigpoint developers
 #include "scan_matcher.hpp"
 
+#include <Eigen/Eigenvalues>
+
 #include <algorithm>
 #include <cmath>
 
@@ -20,6 +22,35 @@ constexpr double kGatePerRootRange = 1.0 / 9.0;
 constexpr double kLeastVariance_m2 = 0.01 * 0.01;
 /// Points that one thread takes at a time.
 constexpr std::size_t kBlock = 256;
+
+/// E[n n^T] of a normal whose direction has variance tilt2 exceeds the true one by this.
+void add_noise(const Vector3d& normal, double weighted_tilt2, Eigen::Matrix3d& noise) {
+  noise -= weighted_tilt2 * normal * normal.transpose();
+  noise.diagonal().array() += weighted_tilt2;
+}
+
+/// Normals are measured too. Along a tunnel none has a true component, but their noise has one, and
+/// its squares add up to information that is none: least squares with noisy regressors, which holds
+/// the estimate back at the prediction and makes it look certain [W. A. Fuller, Measurement Error
+/// Models, 1987, ch. 1]. Along each principal axis of the position's information A, with N of it
+/// noise and f = 1 - N / A: the solution g / (A - N) has the variance A / (A - N)^2, which is that
+/// of the information f^2 A with the gradient f g.
+template <int Size>
+void take_out_noise(Information<Size>& sum) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(
+      sum.information.template topLeftCorner<3, 3>());
+  Eigen::Matrix3d keep = Eigen::Matrix3d::Zero();
+  for (int i = 0; i < 3; ++i) {
+    const Vector3d axis = axes.eigenvectors().col(i);
+    const double noise = axis.dot(sum.noise * axis);
+    const double share = std::max(0.0, 1.0 - noise / (axes.eigenvalues()[i] + 1e-12));
+    keep += share * axis * axis.transpose();
+  }
+  typename Information<Size>::Matrix by = Information<Size>::Matrix::Identity();
+  by.template topLeftCorner<3, 3>() = keep;
+  sum.information = (by * sum.information * by).eval();
+  sum.gradient = (by * sum.gradient).eval();
+}
 
 std::size_t blocks_of(std::size_t count) {
   return (count + kBlock - 1) / kBlock;
@@ -111,6 +142,7 @@ void ScanMatcher::add(Residual& r, const Viewpoint& view, PoseInformation& sum) 
   h << r.plane.normal, r.point_base_m.cross(normal_base);
   sum.information.selfadjointView<Eigen::Lower>().rankUpdate(h, weight);
   sum.gradient += weight * r.residual_m * h;
+  add_noise(r.plane.normal, weight * r.plane.tilt2_rad2, sum.noise);
 }
 
 void ScanMatcher::add(Residual& r, const Viewpoint& view, PoseAndExtrinsicInformation& sum) const {
@@ -145,6 +177,7 @@ void ScanMatcher::add(Residual& r, const Viewpoint& view, PoseAndExtrinsicInform
   h.segment<3>(error::kRotation) = point_base_m.cross(normal_base);
   sum.information.selfadjointView<Eigen::Lower>().rankUpdate(h, weight);
   sum.gradient += weight * r.residual_m * h;
+  add_noise(normal, weight * r.plane.tilt2_rad2, sum.noise);
 }
 
 /// Block by block and the blocks in order, so that the sum has the same rounding on any number of
@@ -163,6 +196,7 @@ Information<Size> ScanMatcher::sum_of_all(const Viewpoint& view,
   for (const Information<Size>& part : sums) {
     sum.information += part.information;
     sum.gradient += part.gradient;
+    sum.noise += part.noise;
   }
   sum.count = residuals_.size();
   const double scale =
@@ -173,6 +207,8 @@ Information<Size> ScanMatcher::sum_of_all(const Viewpoint& view,
                                  sum.information.template selfadjointView<Eigen::Lower>()))
                         .eval();
   sum.gradient *= scale;
+  sum.noise *= scale;
+  take_out_noise(sum);
   return sum;
 }
 

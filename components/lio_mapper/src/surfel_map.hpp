@@ -88,6 +88,7 @@ class SurfelMap final : public LocalMap {
     Eigen::Vector3d normal{Eigen::Vector3d::UnitZ()};
     Eigen::Vector3d centroid_odom_m{Eigen::Vector3d::Zero()};
     double thickness2_m2{0.0};
+    float tilt2_rad2{0.0F};
     std::uint32_t state{kDirty};  ///< a State, read and written through std::atomic_ref
   };
 

@@ -100,6 +100,7 @@ bool SurfelMap::match(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) co
       plane.normal = found->normal;
       plane.offset_m = -found->normal.dot(found->centroid_odom_m);
       plane.thickness2_m2 = found->thickness2_m2;
+      plane.tilt2_rad2 = static_cast<double>(found->tilt2_rad2);
     }
   }
   return std::isfinite(least_cost) ||
@@ -158,6 +159,7 @@ bool SurfelMap::match_nearest_points(const Eigen::Vector3d& point_odom_m, PlaneM
   plane.normal = fit->normal;
   plane.offset_m = -fit->normal.dot(fit->centroid + point_odom_m);
   plane.thickness2_m2 = thickness2_of_neighbours_m2(*fit, points.size());
+  plane.tilt2_rad2 = tilt2_rad2(*fit, plane.thickness2_m2, kNearestPoints);
   return true;
 }
 
@@ -210,6 +212,7 @@ const SurfelMap::Surfel* SurfelMap::surfel(ParentId id, Surfel& scratch) const {
     stored.normal = scratch.normal;
     stored.centroid_odom_m = scratch.centroid_odom_m;
     stored.thickness2_m2 = scratch.thickness2_m2;
+    stored.tilt2_rad2 = scratch.tilt2_rad2;
     state.store(result, std::memory_order_release);
   }
   return result == kPlane ? &scratch : nullptr;
@@ -226,6 +229,7 @@ SurfelMap::Surfel SurfelMap::fit(const Parent& parent) const {
     result.normal = plane->normal;
     result.centroid_odom_m = plane->centroid + centre_of(parent);
     result.thickness2_m2 = plane->eigenvalues[0] + kThicknessFloor2_m2;
+    result.tilt2_rad2 = static_cast<float>(tilt2_rad2(*plane, result.thickness2_m2, kMinLeaves));
     result.state = kPlane;
   }
   return result;
