@@ -86,7 +86,8 @@ TEST_P(RelativePose, error_over_10_and_50_m_is_what_the_covariance_says) {
   print(local);
 }
 
-// Not measured to the end yet. Run with --gtest_also_run_disabled_tests.
+// On campus and long_drive the stated sigmas are two to four times too large (NEES / 6 from 0.08 to
+// 0.18), so the lower bound is not met. Run with --gtest_also_run_disabled_tests.
 INSTANTIATE_TEST_SUITE_P(DISABLED_Drives,
                          RelativePose,
                          testing::Values(Case{"campus+beams_16", 122.0},
