@@ -245,12 +245,26 @@ RunInfo read_run(const std::string& file) {
   return run;
 }
 
-CountsWriter::CountsWriter(const std::string& folder, const std::string& program)
-    : file_(path_in(folder, program + session_file::kCountsSuffix)) {}
+CountsWriter::CountsWriter(const std::string& folder, const std::string& program, Opening opening)
+    : file_(path_in(folder, program + session_file::kCountsSuffix)) {
+  if (opening == Opening::kContinue && std::filesystem::exists(file_)) {
+    before_ = read_counts(file_);
+  }
+}
 
 void CountsWriter::write(const std::vector<NamedCount>& counts) const {
+  std::vector<NamedCount> sums = before_;
+  for (const NamedCount& count : counts) {
+    const auto same = std::find_if(
+        sums.begin(), sums.end(), [&](const NamedCount& sum) { return sum.name == count.name; });
+    if (same == sums.end()) {
+      sums.push_back(count);
+    } else {
+      same->count += count.count;
+    }
+  }
   std::string text = "# messages: stream.what[.reason]\n";
-  for (const auto& [name, count] : counts) {
+  for (const auto& [name, count] : sums) {
     text += quoted(name) + ": " + std::to_string(count) + "\n";
   }
   write_text(file_, text);

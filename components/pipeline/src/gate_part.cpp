@@ -17,7 +17,7 @@ GatePart::GatePart(const std::string& session, exporter::Opening opening)
     : session_(session),
       trajectory_(path_in(session, file::kFused), "base_link in map, as published online", opening),
       gate_log_(path_in(session, file::kGate), opening),
-      counts_(session, "fusion_gate") {}
+      counts_(session, "fusion_gate", opening) {}
 
 void GatePart::on_fused(const Odometry& odometry) {
   trajectory_.append(odometry.stamp_ns, odometry.T_frame_child);

@@ -11,7 +11,7 @@ GpsPart::GpsPart(const std::string& session, exporter::Opening opening)
     : session_(session),
       trajectory_(path_in(session, file::kGps), "base_link in map, GPS odometry", opening),
       statuses_(path_in(session, file::kGpsStatus), opening),
-      counts_(session, "gps_odometry") {}
+      counts_(session, "gps_odometry", opening) {}
 
 void GpsPart::on_odometry(const Odometry& odometry) {
   trajectory_.append(odometry.stamp_ns, odometry.T_frame_child);

@@ -10,7 +10,9 @@ namespace file = exporter::session_file;
 using exporter::path_in;
 
 LogPart::LogPart(const std::string& session, exporter::Opening opening)
-    : session_(session), fixes_(path_in(session, file::kFixes), opening), counts_(session, "log") {}
+    : session_(session),
+      fixes_(path_in(session, file::kFixes), opening),
+      counts_(session, "log", opening) {}
 
 void LogPart::on_entry(const recording::LogEntry& entry) {
   if (first_ns_ == 0) {

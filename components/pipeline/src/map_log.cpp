@@ -175,7 +175,10 @@ MapLogResult map_log(recording::LogReader& log,
   session.close(cores, log);
 
   result.sweeps_in_log = session.log().sweeps();
-  result.sweeps_used = cores.lio_status().scans_used;
+  // The mapper of a resumed session counts on from what it had used before.
+  const bool resumed = options.stored && options.use == UseOfStored::kResume;
+  result.sweeps_used = cores.lio_status().scans_used -
+                       (resumed ? options.stored->checkpoint.scans_used : std::uint64_t{0});
   result.data_s = to_seconds(session.log().last_ns() - session.log().first_ns());
   result.wall_s = milliseconds_since(start) * 1e-3;
   write_run();

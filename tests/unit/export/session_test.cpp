@@ -225,6 +225,23 @@ TEST(Counts, are_replaced_whole_and_may_be_none) {
             1);
 }
 
+TEST(Counts, go_on_from_those_of_the_session_that_is_resumed) {
+  const ScratchFolder folder;
+  CountsWriter(folder.path(), "log").write({{"points.in_log", 100}, {"fix.withheld", 2}});
+  const CountsWriter resumed(folder.path(), "log", Opening::kContinue);
+  resumed.write({{"points.in_log", 10}});
+  resumed.write({{"points.in_log", 30}, {"imu.in_log", 7}});  // the same run, later
+  std::map<std::string, std::uint64_t> counts;
+  for (const NamedCount& entry : read_counts(folder.file("log.counts.yaml"))) {
+    counts[entry.name] = entry.count;
+  }
+  EXPECT_EQ(counts["points.in_log"], 130U);
+  EXPECT_EQ(counts["fix.withheld"], 2U);
+  EXPECT_EQ(counts["imu.in_log"], 7U);
+  CountsWriter(folder.path(), "log").write({{"points.in_log", 5}});
+  EXPECT_EQ(read_counts(folder.file("log.counts.yaml")).front().count, 5U);
+}
+
 TEST(SessionFolder, is_created_with_its_parents_and_refused_where_a_file_is) {
   const ScratchFolder folder;
   create_session_folder(folder.file("a/b"));

@@ -198,11 +198,16 @@ RunInfo read_run(const std::string& file);
 /// The report compares them along the way of each stream.
 class CountsWriter {
  public:
-  CountsWriter(const std::string& folder, const std::string& program);
+  /// `Opening::kContinue`: what the session's file says already is added to what is written. Throws
+  /// std::runtime_error when that file is damaged.
+  CountsWriter(const std::string& folder,
+               const std::string& program,
+               Opening opening = Opening::kFresh);
   void write(const std::vector<NamedCount>& counts) const;
 
  private:
   std::string file_;
+  std::vector<NamedCount> before_;
 };
 
 std::vector<NamedCount> read_counts(const std::string& file);
