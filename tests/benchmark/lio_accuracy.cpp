@@ -112,9 +112,9 @@ void trace(std::ofstream& file,
     const auto& [to_ns, to] = run.trajectory[i];
     const Pose true_step = truth.at(from_ns).T_map_base.inverse() * truth.at(to_ns).T_map_base;
     const Pose error = true_step.inverse() * (from.inverse() * to);
-    file << drive << ',' << kind << ',' << to_seconds(to_ns - run.trajectory.front().stamp_ns) << ','
-         << true_step.p.norm() << ',' << error.p.x() << ',' << error.p.y() << ',' << error.p.z()
-         << ',' << so3_log(error.q).norm() << '\n';
+    file << drive << ',' << kind << ',' << to_seconds(to_ns - run.trajectory.front().stamp_ns)
+         << ',' << true_step.p.norm() << ',' << error.p.x() << ',' << error.p.y() << ','
+         << error.p.z() << ',' << so3_log(error.q).norm() << '\n';
   }
 }
 

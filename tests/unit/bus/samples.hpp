@@ -150,7 +150,8 @@ inline StateUpdate state_update() {
   update.position_map_m = {-1.0, -2.0, -3.0};
   update.covariance_map_m2 = counting_matrix<3>(0.75);
   update.lever_arm_base_m = {0.3, 0.2, 1.1};
-  update.first_alignment = Alignment{6, {0.25, {100.0, 200.0, 300.0}}, counting_matrix<4>(400.0), true};
+  update.first_alignment =
+      Alignment{6, {0.25, {100.0, 200.0, 300.0}}, counting_matrix<4>(400.0), true};
   return update;
 }
 
