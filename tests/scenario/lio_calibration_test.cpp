@@ -53,14 +53,14 @@ TEST(Extrinsic, table_of_right_and_wrong_configurations) {
       });
       for (int i = 0; i < kSeeds; ++i) {
         const LioDrive& drive = drives[static_cast<std::size_t>(i)];
-        const AlignedError error = aligned_error(drive);
+        const evaluation::AbsoluteError error = aligned_error(drive);
         std::printf("%s %d %d  %6.3f %6.3f %6.3f",
                     wrong ? "wrong" : "right",
                     estimate,
                     i + 1,
-                    error.mean_m,
-                    error.rms_level_m,
-                    error.rms_up_m);
+                    error.position_m.mean,
+                    error.horizontal_m.rmse,
+                    error.axes_m[2].rmse);
         if (estimate) {
           for (const double at_s : {10.0, 40.0, 80.0, 200.0}) {
             const LioSample* at = &drive.samples.front();

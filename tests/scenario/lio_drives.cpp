@@ -76,34 +76,13 @@ std::vector<LioDrive> drive_lio_all(int runs, const std::function<LioDrive(int)>
   return results;
 }
 
-AlignedError aligned_error(const LioDrive& drive) {
-  Vector3d mean_estimate = Vector3d::Zero();
-  Vector3d mean_truth = Vector3d::Zero();
-  const auto count = static_cast<double>(drive.samples.size());
+evaluation::AbsoluteError aligned_error(const LioDrive& drive) {
+  std::vector<evaluation::PosePair> pairs;
   for (const LioSample& s : drive.samples) {
-    mean_estimate += s.odometry.T_frame_child.p / count;
-    mean_truth += s.truth.p / count;
+    pairs.push_back({s.odometry.stamp_ns, s.odometry.T_frame_child, s.truth});
   }
-  double sine = 0.0;
-  double cosine = 0.0;
-  for (const LioSample& s : drive.samples) {
-    const Vector3d a = s.odometry.T_frame_child.p - mean_estimate;
-    const Vector3d b = s.truth.p - mean_truth;
-    cosine += a.x() * b.x() + a.y() * b.y();
-    sine += a.x() * b.y() - a.y() * b.x();
-  }
-  const Eigen::Quaterniond q = from_yaw(std::atan2(sine, cosine));
-  AlignedError result;
-  for (const LioSample& s : drive.samples) {
-    const Vector3d error =
-        q * (s.odometry.T_frame_child.p - mean_estimate) - (s.truth.p - mean_truth);
-    result.mean_m += error.norm() / count;
-    result.rms_level_m += error.head<2>().squaredNorm() / count;
-    result.rms_up_m += error.z() * error.z() / count;
-  }
-  result.rms_level_m = std::sqrt(result.rms_level_m);
-  result.rms_up_m = std::sqrt(result.rms_up_m);
-  return result;
+  const auto T = evaluation::align(pairs, evaluation::AlignmentKind::kYawTranslation);
+  return evaluation::absolute_error(T ? evaluation::place_estimates(*T, pairs) : pairs);
 }
 
 double RelativeError::nees_per_axis() const {

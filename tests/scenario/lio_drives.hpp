@@ -3,6 +3,7 @@
 // The mapper alone (mode lio) on simulated drives, and what can be said about it against the truth.
 #pragma once
 
+#include "trigpoint/evaluation/trajectory_error.hpp"
 #include "trigpoint/lio_mapper/lio_mapper.hpp"
 #include "trigpoint/simulator/simulator.hpp"
 
@@ -51,14 +52,8 @@ LioDrive drive_lio(const simulator::Scenario& scenario,
 /// `runs` drives, two at a time, in order.
 std::vector<LioDrive> drive_lio_all(int runs, const std::function<LioDrive(int)>& drive);
 
-/// Mean distance after alignment of the whole drive in yaw and position.
-struct AlignedError {
-  double mean_m{0.0};
-  double rms_level_m{0.0};
-  double rms_up_m{0.0};
-};
-
-AlignedError aligned_error(const LioDrive& drive);
+/// After alignment of the whole drive in yaw and position.
+evaluation::AbsoluteError aligned_error(const LioDrive& drive);
 
 /// Error of the change of pose from one sample to another, in odom's axes at `from`, and the
 /// covariance that the mapper gives it (relative_pose_covariance).

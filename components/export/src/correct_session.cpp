@@ -81,16 +81,20 @@ PastSettings past_settings_of(const std::string& session) {
   return settings;
 }
 
+lio_mapper::GraphKeyframe graph_keyframe_of(const lio_mapper::Keyframe& keyframe) {
+  return {keyframe.stamp_ns,
+          keyframe.odom_epoch,
+          keyframe.T_odom_base,
+          keyframe.aligned,
+          keyframe.T_map_odom};
+}
+
 GraphInput graph_input_of(const std::string& session) {
   GraphInput input;
   input.drift = past_settings_of(session).drift;
   KeyframeReader store(path_in(session, session_file::kKeyframes));
   store.visit_places([&](const lio_mapper::Keyframe& keyframe) {
-    input.keyframes.push_back({keyframe.stamp_ns,
-                               keyframe.odom_epoch,
-                               keyframe.T_odom_base,
-                               keyframe.aligned,
-                               keyframe.T_map_odom});
+    input.keyframes.push_back(graph_keyframe_of(keyframe));
   });
   store.visit_rows([&](const lio_mapper::StoredRow& row) { input.rows.push_back(row); });
   const std::string alignment = path_in(session, session_file::kAlignment);

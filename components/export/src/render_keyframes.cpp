@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
+#include "trigpoint/base/point_cloud.hpp"
 #include "trigpoint/export/correct_session.hpp"
 #include "trigpoint/lio_mapper/pose_graph.hpp"
 #include "trigpoint/lio_mapper/see_through.hpp"
@@ -52,13 +53,8 @@ lio_mapper::GraphInput survey(const KeyframeSource& keyframes,
                               const std::optional<Alignment>& fallback) {
   lio_mapper::GraphInput input;
   input.fallback = fallback;
-  keyframes([&](const Keyframe& keyframe) {
-    input.keyframes.push_back({keyframe.stamp_ns,
-                               keyframe.odom_epoch,
-                               keyframe.T_odom_base,
-                               keyframe.aligned,
-                               keyframe.T_map_odom});
-  });
+  keyframes(
+      [&](const Keyframe& keyframe) { input.keyframes.push_back(graph_keyframe_of(keyframe)); });
   return input;
 }
 
@@ -82,17 +78,6 @@ Places places_of(const lio_mapper::GraphInput& input, const CorrectedPoses* corr
   return places;
 }
 
-PointCloud placed(const Pose& T_frame_base, const PointCloud& points) {
-  PointCloud result = points;
-  for (auto& point : result) {
-    const Eigen::Vector3d p = T_frame_base * point.position().cast<double>();
-    point.x = static_cast<float>(p.x());
-    point.y = static_cast<float>(p.y());
-    point.z = static_cast<float>(p.z());
-  }
-  return result;
-}
-
 /// Goes through the keyframes that have a place, and tells how far it is.
 class Passes {
  public:
@@ -106,7 +91,7 @@ class Passes {
     std::size_t i = 0;
     keyframes_([&](const Keyframe& keyframe) {
       if (i < places_.T_frame_base.size() && places_.T_frame_base[i]) {
-        visit(i, placed(*places_.T_frame_base[i], keyframe.points_base));
+        visit(i, moved(keyframe.points_base, *places_.T_frame_base[i]));
       }
       ++i;
       if (progress_) {

@@ -2,6 +2,8 @@
 // Copyright the Trigpoint developers
 #include "ikd_map.hpp"
 
+#include "trigpoint/base/point_cloud.hpp"
+
 #include "plane_fit.hpp"
 
 #include <algorithm>
@@ -54,15 +56,7 @@ void IkdMap::prune(const Vector3d& center_odom_m, double half_side_m) {
 }
 
 void IkdMap::transform(const Pose& T_new_old) {
-  PointCloud moved = tree_.points();
-  for (PointXyzi& point : moved) {
-    const Vector3d p = T_new_old * point.position().cast<double>();
-    point = {static_cast<float>(p.x()),
-             static_cast<float>(p.y()),
-             static_cast<float>(p.z()),
-             point.intensity};
-  }
-  tree_.build(moved);
+  tree_.build(moved(tree_.points(), T_new_old));
 }
 
 void IkdMap::rebuild(const PointCloud& points_odom) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
+#include "trigpoint/base/point_cloud.hpp"
 #include "trigpoint/lio_mapper/keyframe_store.hpp"
 
 #include "point_codec.hpp"
@@ -31,16 +32,6 @@ PointCloud raw_points(const Statement& row, int column) {
   PointCloud points(row.size(column) / sizeof(PointXyzi));
   row.copy(column, points.data(), points.size() * sizeof(PointXyzi));
   return points;
-}
-
-PointCloud moved(const PointCloud& points, const Pose& T) {
-  PointCloud result;
-  result.reserve(points.size());
-  for (const PointXyzi& point : points) {
-    const Eigen::Vector3f p = (T * point.position().cast<double>()).cast<float>();
-    result.push_back({p.x(), p.y(), p.z(), point.intensity});
-  }
-  return result;
 }
 
 }  // namespace

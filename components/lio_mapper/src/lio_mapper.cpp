@@ -287,13 +287,7 @@ void LioMapper::Impl::report(const ScanOutcome& outcome, Output& output) {
   status.observability = outcome.observability;
   refresh_status();
   result.status = status;
-  const Eigen::Matrix3f R = state.T_odom_base.q.toRotationMatrix().cast<float>();
-  const Eigen::Vector3f t = state.T_odom_base.p.cast<float>();
-  result.points_odom.reserve(outcome.thinned_base.size());
-  for (const PointXyzi& point : outcome.thinned_base) {
-    const Eigen::Vector3f p = R * point.position() + t;
-    result.points_odom.push_back({p.x(), p.y(), p.z(), point.intensity});
-  }
+  result.points_odom = transformed(outcome.thinned_base, state.T_odom_base);
   if (outcome.used && !stored_points &&
       keyframe_trigger.fires(filter->stamp_ns(), state.T_odom_base)) {
     result.keyframe = make_keyframe(outcome, result.odometry);

@@ -2,6 +2,7 @@
 // Copyright the Trigpoint developers
 #include "pose_graph_loops.hpp"
 
+#include "trigpoint/base/point_cloud.hpp"
 #include "trigpoint/base/so3.hpp"
 
 #include "downsample.hpp"
@@ -139,13 +140,7 @@ const LocalMap& LoopSearch::map_about(std::size_t keyframe) {
   std::unique_ptr<LocalMap> map = make_surfel_map(config);
   const auto [first, last] = stretch_about(keyframe, options_.loop_half_map_m);
   for (std::size_t i = first; i < last; ++i) {
-    const Pose T = odom_between(input_, keyframe, i);
-    PointCloud points = downsample(cloud_of_(i), kMapVoxel_m);
-    for (PointXyzi& point : points) {
-      const Eigen::Vector3f p = (T * point.position().cast<double>()).cast<float>();
-      point = {p.x(), p.y(), p.z(), point.intensity};
-    }
-    map->insert(points);
+    map->insert(moved(downsample(cloud_of_(i), kMapVoxel_m), odom_between(input_, keyframe, i)));
   }
   maps_by_age_.push_back(keyframe);
   return *(maps_[keyframe] = std::move(map));

@@ -116,9 +116,10 @@ DriftRate drift_rate(const DriftConfig& drift, const Matrix6d& local) {
   DriftRate rate;
   rate.position_m2 =
       square(drift.position_sigma_m_sqrtm) * Matrix3d::Identity() + inherited * position_m2;
-  rate.tilt_rad2 = square(drift.tilt_sigma_rad_sqrtm) * Eigen::Matrix2d::Identity() +
-                   inherited * std::min(most_rad2, local.block<2, 2>(3, 3).trace()) *
-                       local.block<2, 2>(3, 3) / (local.block<2, 2>(3, 3).trace() + 1e-18);
+  const Eigen::Matrix2d tilt_rad2 = local.block<2, 2>(3, 3);
+  rate.tilt_rad2 =
+      square(drift.tilt_sigma_rad_sqrtm) * Eigen::Matrix2d::Identity() +
+      inherited * std::min(most_rad2, tilt_rad2.trace()) * tilt_rad2 / (tilt_rad2.trace() + 1e-18);
   rate.yaw_rad2 = square(drift.yaw_sigma_rad_sqrtm) + inherited * std::min(most_rad2, local(5, 5));
   return rate;
 }

@@ -138,20 +138,26 @@ struct SeeThrough::Impl {
     return moments;
   }
 
-  void fit(Voxel& voxel) {
-    const Vector3d centre_m = centre_of(voxel.index);
-    Moments moments;
+  /// The voxels that exist of the 27 around a place, itself included.
+  template <typename Visit>
+  void for_each_around(const VoxelIndex& i, const Visit& visit) const {
     for (int dx = -1; dx <= 1; ++dx) {
       for (int dy = -1; dy <= 1; ++dy) {
         for (int dz = -1; dz <= 1; ++dz) {
-          const VoxelIndex& i = voxel.index;
           const auto found = index.find(voxel_key({i.x + dx, i.y + dy, i.z + dz}));
           if (found != index.end()) {
-            moments += moments_about(voxels[found->second], centre_m);
+            visit(found->second);
           }
         }
       }
     }
+  }
+
+  void fit(Voxel& voxel) {
+    const Vector3d centre_m = centre_of(voxel.index);
+    Moments moments;
+    for_each_around(voxel.index,
+                    [&](std::uint32_t near) { moments += moments_about(voxels[near], centre_m); });
     voxel.shape = Voxel::Shape::kNone;
     const std::optional<PlaneFit> plane =
         moments.count < kFewestForPlane ? std::nullopt : fit_plane(moments);
@@ -303,17 +309,11 @@ struct SeeThrough::Impl {
   }
 
   void spread_from(const Voxel& voxel, std::vector<std::uint32_t>& next) const {
-    for (int dx = -1; dx <= 1; ++dx) {
-      for (int dy = -1; dy <= 1; ++dy) {
-        for (int dz = -1; dz <= 1; ++dz) {
-          const VoxelIndex& i = voxel.index;
-          const auto found = index.find(voxel_key({i.x + dx, i.y + dy, i.z + dz}));
-          if (found != index.end() && goes_along(voxels[found->second])) {
-            next.push_back(found->second);
-          }
-        }
+    for_each_around(voxel.index, [&](std::uint32_t near) {
+      if (goes_along(voxels[near])) {
+        next.push_back(near);
       }
-    }
+    });
   }
 
   SeeThroughOptions options;
