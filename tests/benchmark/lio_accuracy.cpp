@@ -11,10 +11,10 @@
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <ctime>
 #include <fstream>
 #include <map>
 #include <stdexcept>
@@ -27,7 +27,12 @@ namespace {
 using namespace trigpoint;
 using evaluation::PosePair;
 
-constexpr std::array<const char*, 2> kKinds{"surfel_map", "ikd_tree"};
+/// CPU time of the whole process: the mapper's threads count.
+double cpu_ms() {
+  timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
+}
 
 struct Score {
   double distance_m{0.0};
@@ -40,6 +45,7 @@ struct Score {
   double levelled_z_m{kNaN};
   double tilt_deg{kNaN};  ///< left after that
   double refused{0.0};
+  double scan_ms{kNaN};  ///< CPU time
 
   double error_m() const { return std::hypot(levelled_xy_m, levelled_z_m); }
 };
@@ -48,7 +54,11 @@ struct Score {
 struct Run {
   Run(const lio_mapper::Config& config, const RobotConfig& robot) : mapper(config, robot) {}
 
-  void take(const lio_mapper::Output& output) {
+  template <typename Feed>
+  void take(Feed feed) {
+    const double before_ms = cpu_ms();
+    const lio_mapper::Output output = feed(mapper);
+    spent_ms += cpu_ms() - before_ms;
     for (const lio_mapper::ScanResult& scan : output.scans) {
       trajectory.push_back({scan.odometry.stamp_ns, scan.odometry.T_frame_child});
     }
@@ -56,6 +66,7 @@ struct Run {
 
   lio_mapper::LioMapper mapper;
   evaluation::Trajectory trajectory;
+  double spent_ms{0.0};
 };
 
 /// Mean tilt of the aligned estimate against the reference.
@@ -118,10 +129,12 @@ void trace(std::ofstream& file,
   }
 }
 
-std::map<std::string, Score> drive(const cli::InputOptions& options, std::ofstream& traces) {
+std::map<std::string, Score> drive(const cli::InputOptions& options,
+                                   const std::vector<std::string>& kinds,
+                                   std::ofstream& traces) {
   cli::Input input = cli::open_input(options);
   std::map<std::string, Run> runs;
-  for (const char* kind : kKinds) {
+  for (const std::string& kind : kinds) {
     lio_mapper::Config config = input.config.cores.lio_mapper;
     config.local_map.kind = kind;
     runs.try_emplace(kind, config, input.config.cores.robot);
@@ -129,17 +142,18 @@ std::map<std::string, Score> drive(const cli::InputOptions& options, std::ofstre
   while (const auto entry = input.reader->next()) {
     for (auto& [kind, run] : runs) {
       if (const auto* imu = std::get_if<ImuSample>(&entry->measurement)) {
-        run.take(run.mapper.on_imu(*imu));
+        run.take([&](lio_mapper::LioMapper& mapper) { return mapper.on_imu(*imu); });
       } else if (const auto* cloud = std::get_if<PointCloudMessage>(&entry->measurement)) {
-        run.take(run.mapper.on_cloud(*cloud));
+        run.take([&](lio_mapper::LioMapper& mapper) { return mapper.on_cloud(*cloud); });
       }
     }
   }
   const auto& scenario = dynamic_cast<const simulator::ScenarioReader&>(*input.reader);
   std::map<std::string, Score> scores;
   for (auto& [kind, run] : runs) {
-    run.take(run.mapper.finish());
+    run.take([](lio_mapper::LioMapper& mapper) { return mapper.finish(); });
     scores[kind] = score_of(run, *scenario.truth());
+    scores[kind].scan_ms = run.spent_ms / static_cast<double>(run.trajectory.size());
     if (traces.is_open()) {
       trace(traces,
             options.log + " seed " + std::to_string(options.seed.value_or(0)),
@@ -158,7 +172,7 @@ void print(const std::string& scenario,
            const Score& s) {
   std::printf(
       "| %s | %lld | %llu | %s | %.0f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | "
-      "%.2f | %.2f | %.0f |\n",
+      "%.2f | %.2f | %.0f | %.1f |\n",
       scenario.c_str(),
       static_cast<long long>(beams),
       static_cast<unsigned long long>(seed),
@@ -173,7 +187,8 @@ void print(const std::string& scenario,
       s.levelled_z_m,
       s.levelled_z_m / s.levelled_xy_m,
       s.tilt_deg,
-      s.refused);
+      s.refused,
+      s.scan_ms);
   std::fflush(stdout);
 }
 
@@ -189,14 +204,17 @@ int main(int argc, char** argv) {
   app.add_option("--beams", beams, "16, 32, 64");
   app.add_option("--seed", seeds, "one run for each");
   app.add_option("--duration", options.duration_s, "only so much of each drive, s");
+  std::vector<std::string> kinds{"surfel_map", "ikd_tree"};
+  app.add_option("--map", kinds, "surfel_map, ikd_tree; both when left out");
   std::string trace_file;
   app.add_option("--trace", trace_file, "CSV of the error over each second, a line a scan");
   trigpoint::cli::add_config_options(app, options);
   CLI11_PARSE(app, argc, argv);
   std::printf(
       "| drive | beams | seed | map | m | %% over 10 m | %% over 50 m | %% at the end | driven xy "
-      "m | z m | levelled xy m | z m | z / xy | tilt deg | refused |\n"
-      "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+      "m | z m | levelled xy m | z m | z / xy | tilt deg | refused | "
+      "CPU ms a scan |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   try {
     std::ofstream traces;
     if (!trace_file.empty()) {
@@ -215,9 +233,12 @@ int main(int argc, char** argv) {
           options.log = scenario;
           options.changes.beams = n;
           options.seed = seed;
-          const auto scores = drive(options, traces);
+          const auto scores = drive(options, kinds, traces);
           for (const auto& [kind, score] : scores) {
             print(scenario, n, seed, kind, score);
+          }
+          if (scores.size() < 2) {
+            continue;
           }
           const double surfel = scores.at("surfel_map").error_m();
           const double ikd = scores.at("ikd_tree").error_m();
@@ -226,6 +247,9 @@ int main(int argc, char** argv) {
           worst_m = std::max(worst_m, surfel - (1.5 * ikd + 0.02));
         }
       }
+    }
+    if (kinds.size() < 2) {
+      return 0;
     }
     std::printf(
         "levelled error of surfel_map / of ikd_tree, mean: %.2f (at most 1.1); the worst drive "

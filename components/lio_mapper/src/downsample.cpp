@@ -69,7 +69,7 @@ std::vector<Point> keep_centre_most(const std::vector<Point>& points, double vox
   const double inverse_voxel_per_m = 1.0 / voxel_m;
   VoxelNumbering voxels;
   std::vector<Point> kept;
-  std::vector<double> distances2;  // of `kept` from their centres, in voxels
+  std::vector<float> distances2;  // of `kept` from their centres, in voxels
   for (const Point& point : points) {
     if (!voxel_index_fits(point.x, point.y, point.z, inverse_voxel_per_m)) {
       continue;
@@ -78,7 +78,7 @@ std::vector<Point> keep_centre_most(const std::vector<Point>& points, double vox
     const double dx = point.x * inverse_voxel_per_m - (index.x + 0.5);
     const double dy = point.y * inverse_voxel_per_m - (index.y + 0.5);
     const double dz = point.z * inverse_voxel_per_m - (index.z + 0.5);
-    const double distance2 = dx * dx + dy * dy + dz * dz;
+    const auto distance2 = static_cast<float>(dx * dx + dy * dy + dz * dz);
     const std::uint32_t number = voxels.number_of(voxel_key(index));
     if (number == kept.size()) {
       kept.push_back(point);

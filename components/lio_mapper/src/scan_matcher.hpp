@@ -29,8 +29,9 @@ class ScanMatcher {
               const MatchingConfig& config,
               Workers& workers);
 
-  /// Looks up the planes again when the pose has moved since the last time by more than planes
-  /// can forgive; else only residuals and weights are new.
+  /// Looks up the planes of the points that have moved, since they were looked up, by more than
+  /// planes can forgive; else only residuals and weights are new. Where surfaces leave the pose
+  /// open, points without one are matched with their nearest points.
   PoseInformation linearise(const Pose& T_odom_base);
 
   /// The same with the extrinsic as unknown, r = n . (R (R_bl p_l + t_bl) + p) + d. Where the map's
@@ -48,6 +49,7 @@ class ScanMatcher {
     Eigen::Vector3d point_base_m;
     Eigen::Vector3d direction_base;  ///< of the beam
     double range_m;
+    Eigen::Vector3d looked_up_at_odom_m;
     PlaneMatch plane;
     double residual_m;
     const MapOrigin* origin;  ///< of the plane; null: unknown, or not asked for
@@ -61,29 +63,35 @@ class ScanMatcher {
     Pose T_base_base;  ///< from the axes of the points to those of the present extrinsic
   };
 
-  bool must_match_again(const Pose& T_odom_base) const;
-  void match(const Pose& T_odom_base);
-  bool match_point(const PointXyzi& point,
-                   const Eigen::Matrix3d& R,
-                   const Eigen::Vector3d& p,
-                   Residual& residual) const;
+  using Ask = bool (LocalMap::*)(const Eigen::Vector3d&, PlaneMatch&) const;
+
+  enum class Found : std::uint8_t { kNotAsked, kNothing, kMisfit, kPlane };
+
+  void refresh(std::size_t i, const Viewpoint& view, const MapOrigins* origins);
+  Found look_up(Ask ask, Residual& residual) const;
+  static bool leaves_pose_open(const Matrix6d& information);
   double variance_m2(const Residual& residual, double cos_incidence) const;
   double weight_of(const Residual& residual, double cos_incidence) const;
   void add(Residual& residual, const Viewpoint& view, PoseInformation& sum) const;
   void add(Residual& residual, const Viewpoint& view, PoseAndExtrinsicInformation& sum) const;
   template <int Size>
-  Information<Size> sum_of_all(const Viewpoint& view, std::vector<Information<Size>>& sums);
+  Information<Size> sum_of_all(const Viewpoint& view,
+                               const MapOrigins* origins,
+                               std::vector<Information<Size>>& sums);
+  template <int Size>
+  Information<Size> linearise_all(const Viewpoint& view,
+                                  const MapOrigins* origins,
+                                  std::vector<Information<Size>>& sums);
 
   const PointCloud& points_base_;
   const LocalMap& map_;
   Pose T_base_lidar_;
   const MatchingConfig& config_;
   Workers& workers_;
-  bool matched_{false};
-  Pose T_odom_base_matched_;
-  std::vector<Residual> residuals_;
-  std::vector<Residual> slots_;  ///< one a point, while matching
-  std::vector<std::uint8_t> has_match_;
+  bool judged_{false};  ///< whether surfaces are enough for this scan
+  bool also_nearest_{false};
+  std::vector<Residual> residuals_;  ///< one a point, also where none was found
+  std::vector<Found> found_;
   // Of blocks.
   std::vector<PoseInformation> sums_;
   std::vector<PoseAndExtrinsicInformation> sums_with_extrinsic_;

@@ -11,6 +11,10 @@ namespace trigpoint::lio_mapper::surfel_grid {
 
 inline constexpr int kSide = 3;  // leaves along a parent
 
+/// A point nearer than this to the face of an empty leaf may belong to the leaf behind the face, in
+/// parts of a leaf's side (5 cm of 0.5 m: 2.5 sigma of a LiDAR's range noise).
+inline constexpr double kFaceBand = 0.1;
+
 constexpr int slot(int x, int y, int z) {
   return (x * kSide + y) * kSide + z;
 }

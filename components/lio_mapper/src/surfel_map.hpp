@@ -6,7 +6,6 @@
 #include "plane_fit.hpp"
 #include "voxel_key.hpp"
 #include <Eigen/Core>
-#include <tsl/robin_map.h>
 
 #include <array>
 #include <cstdint>
@@ -23,13 +22,22 @@ namespace trigpoint::lio_mapper {
 /// any other: the fit also sees the leaves of the neighbouring parents that touch this one, and a
 /// query near a face also looks behind it.
 ///
-/// Between two insertions a plane is a function of the leaves alone, not of who asked first, so
-/// threads that match at once all get the same bits.
+/// Kept small, because a search costs what it fetches from memory: 64 bytes a parent, 16 a leaf.
+/// Coordinates of a parent's leaves are 16-bit numbers from its centre, in units of 28 micrometres.
+///
+/// A plane is fitted again when more than an eighth of its leaves have changed. Between two
+/// insertions it does not depend on who asks first, so threads that match at once all get the same
+/// bits.
 class SurfelMap final : public LocalMap {
  public:
   explicit SurfelMap(const SurfelMapConfig& config);
 
-  bool match(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) const override;
+  bool match(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) const override {
+    return match_surface(point_odom_m, plane) || match_nearest(point_odom_m, plane);
+  }
+
+  bool match_surface(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) const override;
+  bool match_nearest(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) const override;
   void insert(const PointCloud& points_odom) override;
   void prune(const Eigen::Vector3d& center_odom_m, double half_side_m) override;
   /// Leaf means keep their weights; leaves are laid anew.
@@ -49,28 +57,50 @@ class SurfelMap final : public LocalMap {
   static constexpr int kLeaves = 27;  // of a parent; also the parents around one, itself included
   static constexpr int kCentre = 13;  // itself
 
-  /// Relative to the parent's centre, so that float keeps micrometres far from the origin.
-  struct LeafMean {
-    float x{0.0F};
-    float y{0.0F};
-    float z{0.0F};
-    float intensity{0.0F};
-  };
-
-  /// A point of a leaf, from the parent's centre in parts of `stored_unit_m_`.
-  struct StoredPoint {
+  /// From the parent's centre, in `unit_m_`.
+  struct Offset {
     std::int16_t x{0};
     std::int16_t y{0};
     std::int16_t z{0};
   };
 
-  struct Parent {
+  struct Leaf {
+    Offset mean;
+    std::uint16_t count{0};           ///< points in the mean
+    Offset point;                     ///< of them the one nearest the leaf's centre, ...
+    Eigen::bfloat16 intensity{0.0F};  ///< ... and its intensity
+  };
+
+  static_assert(sizeof(Leaf) == 16);
+
+  struct Plane {
+    Eigen::Vector3f normal{Eigen::Vector3f::UnitZ()};
+    Eigen::Vector3f centroid_m{Eigen::Vector3f::Zero()};  ///< from the parent's centre
+    float thickness2_m2{0.0F};
+    float tilt2_rad2{0.0F};
+  };
+
+  enum State : std::uint32_t { kDirty, kFitting, kPlane, kNoPlane };
+
+  struct alignas(64) Parent {
     VoxelIndex index;
-    std::uint32_t occupied{0};  ///< bit i: leaf i has points
-    std::array<LeafMean, kLeaves> means{};
-    std::array<StoredPoint, kLeaves> points{};  ///< the one nearest the leaf's centre
-    std::array<std::uint16_t, kLeaves> counts{};
-    std::array<ParentId, kLeaves> neighbours{};
+    std::uint32_t occupied{0};    ///< bit i: leaf i has points
+    std::uint32_t neighbours{0};  ///< bit d: there is a parent in that direction
+    std::uint32_t first_leaf{0};  ///< in `leaves_`, where they stand in the order of their bits
+    Plane plane;
+    std::uint32_t state{kDirty};  ///< a State, read and written through std::atomic_ref
+    std::uint8_t size_class{0};   ///< how many leaves there is room for
+    std::uint8_t changes{0};      ///< of leaves that the plane sees, since it was fitted
+    std::uint8_t tolerated{0};    ///< so many of them
+  };
+
+  static_assert(sizeof(Parent) == 64);
+
+  /// Where a leaf is, or would be.
+  struct Place {
+    VoxelIndex home;   ///< of the parent
+    VoxelIndex inner;  ///< of the leaf in it
+    ParentId id{kNoParent};
   };
 
   struct NearPoint {
@@ -81,67 +111,70 @@ class SurfelMap final : public LocalMap {
   static constexpr int kNearestPoints = 5;
   using NearestPoints = std::array<NearPoint, kNearestPoints>;
 
-  enum State : std::uint32_t { kDirty, kFitting, kPlane, kNoPlane };
-
-  /// One cache line; apart from Parent because a match reads this and little else.
-  struct Surfel {
-    Eigen::Vector3d normal{Eigen::Vector3d::UnitZ()};
-    Eigen::Vector3d centroid_odom_m{Eigen::Vector3d::Zero()};
-    double thickness2_m2{0.0};
-    float tilt2_rad2{0.0F};
-    std::uint32_t state{kDirty};  ///< a State, read and written through std::atomic_ref
-  };
-
   /// Leaves around a parent, grouped so that smaller windows can be put together from them.
   struct Window {
     Moments own;
     std::array<Moments, 3> slabs;  ///< behind the two faces of each axis
     Moments corners;               ///< behind edges and corners
+
+    Moments all() const {
+      Moments sum = own;
+      sum += corners;
+      for (const Moments& slab : slabs) {
+        sum += slab;
+      }
+      return sum;
+    }
   };
 
-  ParentId find(const VoxelIndex& index) const;
-  ParentId find_or_create(const VoxelIndex& index);
-  void link(ParentId id);
-  void clear();
-  void insert_mean(const PointXyzi& mean, std::uint16_t count);
-  VoxelIndex leaf_for(const Eigen::Vector3d& point_odom_m) const;
-  std::optional<Eigen::Vector3d> mean_of(const VoxelIndex& leaf) const;
+  const Parent& parent(ParentId id) const { return parents_[static_cast<std::size_t>(id)]; }
 
-  Eigen::Vector3d local(const StoredPoint& point) const {
-    return stored_unit_m_ * Eigen::Vector3d(point.x, point.y, point.z);
+  ParentId find(const VoxelIndex& index) const;
+  ParentId neighbour(const Parent& parent, int direction) const;
+  ParentId find_or_create(const Place& place);
+  void put_into_table(ParentId id);
+  void link(ParentId id);
+  void unlink(const Parent& parent);
+  void clear();
+
+  void insert_mean(const PointXyzi& mean, std::uint16_t count);
+  Place place_of(const VoxelIndex& leaf) const;
+  Place place_for(const Eigen::Vector3d& point_odom_m) const;
+  const Leaf* leaf_at(const Place& place) const;
+  Leaf& make_leaf(Parent& parent, int slot);
+  void move_leaves(Parent& parent, std::uint8_t size_class);
+  enum class Change { kOfSome, kForGood };
+  void mark_dirty(const Parent& parent, const VoxelIndex& leaf, Change change);
+
+  Eigen::Vector3d metres(const Offset& offset) const {
+    return unit_m_ * Eigen::Vector3d(offset.x, offset.y, offset.z);
   }
 
-  StoredPoint stored(const Eigen::Vector3d& local_m) const;
-  void keep_centre_most(Parent& parent,
-                        const VoxelIndex& inner,
-                        const Eigen::Vector3d& local_m,
-                        bool first) const;
-  void mark_dirty(const Parent& parent, const VoxelIndex& leaf);
+  Offset offset_of(const Eigen::Vector3d& local_m) const;
   Eigen::Vector3d centre_of(const Parent& parent) const;
   void forget_leaves_outside(Parent& parent, const Eigen::Vector3d& centre, double half_side_m);
   void erase_empty_parents();
 
-  std::array<ParentId, 8> candidates(const Eigen::Vector3d& point_odom_m) const;
-  const Surfel* surfel(ParentId id, Surfel& scratch) const;
+  std::optional<Plane> plane_of(ParentId id) const;
   void offer_points(const Parent& parent,
                     const Eigen::Vector3d& point_odom_m,
                     NearestPoints& nearest) const;
-  bool match_nearest_points(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) const;
-  Surfel fit(const Parent& parent) const;
+  std::optional<Plane> fit(const Parent& parent, int& leaves) const;
   bool is_surface(const Parent& parent, const PlaneFit& plane) const;
   Window window_of(const Parent& parent) const;
-  std::optional<PlaneFit> plane_of(const Window& window) const;
+  std::optional<PlaneFit> flat_fit(const Window& window) const;
   std::optional<PlaneFit> flat_fit(const Moments& moments) const;
 
   SurfelMapConfig config_;
   double inverse_leaf_per_m_;
   double parent_m_;
   double inverse_parent_per_m_;
-  double stored_unit_m_;
+  double unit_m_;
   std::size_t leaf_count_{0};
-  std::vector<Parent> parents_;
-  mutable std::vector<Surfel> surfels_;  ///< same indices; mutable because fitting is lazy
-  tsl::robin_map<VoxelKey, ParentId, VoxelKeyHash> index_;
+  mutable std::vector<Parent> parents_;  ///< mutable because planes are fitted when asked for
+  std::vector<Leaf> leaves_;             ///< in blocks of the size classes
+  std::array<std::vector<std::uint32_t>, 5> free_blocks_;  ///< of each size class
+  std::vector<ParentId> table_;  ///< open addressing by parents' indices, a power of two long
 };
 
 }  // namespace trigpoint::lio_mapper

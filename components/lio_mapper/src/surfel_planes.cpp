@@ -14,6 +14,7 @@
 
 namespace trigpoint::lio_mapper {
 
+using surfel_grid::kFaceBand;
 using surfel_grid::kSide;
 using surfel_grid::neighbour_index;
 using surfel_grid::slot;
@@ -24,6 +25,9 @@ namespace {
 constexpr int kMinLeaves = 5;
 constexpr int kMinOwnLeaves = 3;
 
+/// A plane is fitted again after one change for so many leaves that it saw.
+constexpr int kLeavesPerChange = 8;
+
 /// A query nearer than this to a face, in parts of a parent's side, also looks behind the face
 /// (0.4 m of 1.5 m).
 constexpr double kFaceReach = 0.4 / 1.5;
@@ -31,7 +35,7 @@ constexpr double kFaceReach = 0.4 / 1.5;
 /// A plane is a surface when this share of the points near it lie on it; foliage of a crown has
 /// less than half.
 constexpr double kOnPlane_m = 0.1;
-constexpr double kSurfaceShare = 0.95;
+constexpr double kSurfaceShare = 0.75;
 
 /// Of two planes that both explain a point, the distance to the plane counts this much more than
 /// the distance along it: else a point beside a corner may be given to the wall it does not lie on.
@@ -61,6 +65,10 @@ constexpr std::array<std::uint32_t, 27> touching_leaves() {
 
 constexpr std::array<std::uint32_t, 27> kTouching = touching_leaves();
 
+/// The 27 directions: itself, behind the faces, the edges, the corners.
+constexpr std::array<int, 27> kNearestFirst{13, 4,  10, 12, 14, 16, 22, 1, 3, 5,  7,  9,  11, 15,
+                                            17, 19, 21, 23, 25, 0,  2,  6, 8, 18, 20, 24, 26};
+
 constexpr Eigen::Index axis_of_face(int direction) {
   switch (direction) {
     case slot(0, 1, 1):
@@ -77,34 +85,57 @@ constexpr Eigen::Index axis_of_face(int direction) {
   }
 }
 
+/// Which neighbour a query looks into as well: -1, 0 or 1; `within` in parts of a parent's side.
+constexpr int near_face(double within) {
+  return within < kFaceReach ? -1 : (within > 1.0 - kFaceReach ? 1 : 0);
+}
+
 }  // namespace
 
-bool SurfelMap::match(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) const {
+/// Asks the parent that holds the point, and those behind the faces that are near.
+bool SurfelMap::match_surface(const Eigen::Vector3d& point_odom_m, PlaneMatch& match) const {
   if (!voxel_index_fits(
           point_odom_m.x(), point_odom_m.y(), point_odom_m.z(), inverse_leaf_per_m_)) {
     return false;
   }
+  const Eigen::Vector3d cells = point_odom_m * inverse_parent_per_m_;
+  const VoxelIndex home = voxel_index(cells.x(), cells.y(), cells.z(), 1.0);
+  const std::array<int, 3> behind{
+      near_face(cells.x() - home.x), near_face(cells.y() - home.y), near_face(cells.z() - home.z)};
+  const ParentId own = find(home);
   double least_cost = std::numeric_limits<double>::infinity();
-  Surfel scratch;
-  const std::array<ParentId, 8> parents = candidates(point_odom_m);
-  for (const ParentId id : parents) {
-    const Surfel* found = id == kNoParent ? nullptr : surfel(id, scratch);
-    if (found == nullptr) {
+  for (int i = 0; i < 8; ++i) {
+    const std::array<int, 3> step{
+        (i & 4) != 0 ? behind[0] : 0, (i & 2) != 0 ? behind[1] : 0, (i & 1) != 0 ? behind[2] : 0};
+    const bool repeated = ((i & 4) != 0 && step[0] == 0) || ((i & 2) != 0 && step[1] == 0) ||
+                          ((i & 1) != 0 && step[2] == 0);
+    if (repeated) {
       continue;
     }
-    const Eigen::Vector3d offset = point_odom_m - found->centroid_odom_m;
-    const double residual = found->normal.dot(offset);
+    const int direction = slot(step[0] + 1, step[1] + 1, step[2] + 1);
+    const ParentId id = own == kNoParent ? find(neighbour_index(home, direction))
+                                         : neighbour(parent(own), direction);
+    const auto plane = id == kNoParent ? std::nullopt : plane_of(id);
+    if (!plane) {
+      continue;
+    }
+    const Eigen::Vector3d normal = plane->normal.cast<double>();
+    const Eigen::Vector3d centroid = centre_of(parent(id)) + plane->centroid_m.cast<double>();
+    const Eigen::Vector3d offset = point_odom_m - centroid;
+    const double residual = normal.dot(offset);
     const double cost = offset.squaredNorm() + (kAcrossWeight2 - 1.0) * residual * residual;
     if (std::abs(residual) < config_.max_residual_m && cost < least_cost) {
       least_cost = cost;
-      plane.normal = found->normal;
-      plane.offset_m = -found->normal.dot(found->centroid_odom_m);
-      plane.thickness2_m2 = found->thickness2_m2;
-      plane.tilt2_rad2 = static_cast<double>(found->tilt2_rad2);
+      match.normal = normal;
+      match.offset_m = -normal.dot(centroid);
+      match.thickness2_m2 = static_cast<double>(plane->thickness2_m2);
+      match.tilt2_rad2 = static_cast<double>(plane->tilt2_rad2);
+    }
+    if (i == 0 && std::abs(residual) < kOnPlane_m) {
+      return true;  // surely its own surface: no other has to be looked for
     }
   }
-  return std::isfinite(least_cost) ||
-         (config_.nearest_points && match_nearest_points(point_odom_m, plane));
+  return std::isfinite(least_cost);
 }
 
 /// Offsets from a query, nearest first.
@@ -112,14 +143,13 @@ void SurfelMap::offer_points(const Parent& parent,
                              const Eigen::Vector3d& point_odom_m,
                              NearestPoints& nearest) const {
   const Eigen::Vector3d origin = centre_of(parent) - point_odom_m;
-  const double beyond_m = (origin.cwiseAbs().array() - 0.5 * parent_m_).max(0.0).matrix().norm();
-  if (beyond_m * beyond_m > nearest.back().distance2_m2) {
-    return;
-  }
-  for (std::uint32_t left = parent.occupied; left != 0; left &= left - 1) {
-    const auto leaf = static_cast<std::size_t>(std::countr_zero(left));
-    NearPoint candidate{0.0, origin + local(parent.points[leaf])};
+  for (int i = 0; i < std::popcount(parent.occupied); ++i) {
+    const Leaf& leaf = leaves_[parent.first_leaf + static_cast<std::uint32_t>(i)];
+    NearPoint candidate{0.0, origin + metres(leaf.point)};
     candidate.distance2_m2 = candidate.offset_m.squaredNorm();
+    if (!(candidate.distance2_m2 < nearest.back().distance2_m2)) {
+      continue;
+    }
     for (NearPoint& place : nearest) {
       if (candidate.distance2_m2 < place.distance2_m2) {
         std::swap(candidate, place);
@@ -131,20 +161,36 @@ void SurfelMap::offer_points(const Parent& parent,
 /// Where no plane holds, as in foliage: FAST-LIO2's plane through the five nearest points, of those
 /// that the leaves keep. Their means would not do: in a crown they lie at the leaves' centres and
 /// tell nothing of its shape.
-bool SurfelMap::match_nearest_points(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) const {
+bool SurfelMap::match_nearest(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) const {
+  if (!config_.nearest_points ||
+      !voxel_index_fits(
+          point_odom_m.x(), point_odom_m.y(), point_odom_m.z(), inverse_leaf_per_m_)) {
+    return false;
+  }
   const Eigen::Vector3d cells = point_odom_m * inverse_parent_per_m_;
   const VoxelIndex home = voxel_index(cells.x(), cells.y(), cells.z(), 1.0);
   const ParentId own = find(home);
+  // Squared distances along each axis to the parents before, at and behind the query.
+  const Eigen::Array3d within_m =
+      parent_m_ * (cells.array() - Eigen::Array3d(home.x, home.y, home.z));
+  Eigen::Array33d beyond2_m2 = Eigen::Array33d::Zero();
+  beyond2_m2.col(0) = (within_m - kFaceBand * config_.leaf_m).max(0.0).square();
+  beyond2_m2.col(2) = (parent_m_ - within_m - kFaceBand * config_.leaf_m).max(0.0).square();
+  const double farthest_m = kNearestReach * config_.leaf_m;
   NearestPoints nearest{};
-  for (int direction = 0; direction < kLeaves; ++direction) {
+  nearest.fill({farthest_m * farthest_m, Eigen::Vector3d::Zero()});
+  for (const int direction : kNearestFirst) {
+    if (beyond2_m2(0, direction / 9) + beyond2_m2(1, direction / 3 % 3) +
+            beyond2_m2(2, direction % 3) >=
+        nearest.back().distance2_m2) {
+      continue;
+    }
     const ParentId id = own == kNoParent ? find(neighbour_index(home, direction))
-                                         : parents_[static_cast<std::size_t>(own)]
-                                               .neighbours[static_cast<std::size_t>(direction)];
+                                         : neighbour(parent(own), direction);
     if (id != kNoParent) {
-      offer_points(parents_[static_cast<std::size_t>(id)], point_odom_m, nearest);
+      offer_points(parent(id), point_odom_m, nearest);
     }
   }
-  const double farthest_m = kNearestReach * config_.leaf_m;
   if (!(nearest.back().distance2_m2 < farthest_m * farthest_m)) {
     return false;
   }
@@ -163,98 +209,67 @@ bool SurfelMap::match_nearest_points(const Eigen::Vector3d& point_odom_m, PlaneM
   return true;
 }
 
-/// The parent that holds the point, and those behind the faces that are near; kNoParent fills up.
-std::array<SurfelMap::ParentId, 8> SurfelMap::candidates(const Eigen::Vector3d& point) const {
-  const auto side = [](double cells, std::int32_t index) {
-    const double within = cells - index;
-    return within < kFaceReach ? -1 : (within > 1.0 - kFaceReach ? 1 : 0);
-  };
-  const Eigen::Vector3d cells = point * inverse_parent_per_m_;
-  const VoxelIndex home = voxel_index(cells.x(), cells.y(), cells.z(), 1.0);
-  const int dx = side(cells.x(), home.x);
-  const int dy = side(cells.y(), home.y);
-  const int dz = side(cells.z(), home.z);
-  const ParentId own = find(home);
-
-  std::array<ParentId, 8> ids{};
-  ids.fill(kNoParent);
-  for (int i = 0; i < 8; ++i) {
-    const int x = (i & 4) != 0 ? dx : 0;
-    const int y = (i & 2) != 0 ? dy : 0;
-    const int z = (i & 1) != 0 ? dz : 0;
-    const bool repeated =
-        ((i & 4) != 0 && dx == 0) || ((i & 2) != 0 && dy == 0) || ((i & 1) != 0 && dz == 0);
-    if (repeated) {
-      continue;
-    }
-    const int direction = slot(x + 1, y + 1, z + 1);
-    ids[static_cast<std::size_t>(i)] = own == kNoParent
-                                           ? find(neighbour_index(home, direction))
-                                           : parents_[static_cast<std::size_t>(own)]
-                                                 .neighbours[static_cast<std::size_t>(direction)];
-  }
-  return ids;
-}
-
-/// Null where no plane holds. A thread that finds a plane out of date fits it for itself; the first
-/// one also stores it. All compute the same bits, so nobody has to wait.
-const SurfelMap::Surfel* SurfelMap::surfel(ParentId id, Surfel& scratch) const {
-  Surfel& stored = surfels_[static_cast<std::size_t>(id)];
-  const std::atomic_ref<std::uint32_t> state(stored.state);
+/// Nothing where no plane holds. A thread that finds a plane out of date fits it for itself; the
+/// first one also stores it. All compute the same bits, so nobody has to wait.
+std::optional<SurfelMap::Plane> SurfelMap::plane_of(ParentId id) const {
+  Parent& asked = parents_[static_cast<std::size_t>(id)];
+  const std::atomic_ref<std::uint32_t> state(asked.state);
   std::uint32_t seen = state.load(std::memory_order_acquire);
-  if (seen == kPlane || seen == kNoPlane) {
-    return seen == kPlane ? &stored : nullptr;
+  if (seen == kPlane) {
+    return asked.plane;
   }
-  scratch = fit(parents_[static_cast<std::size_t>(id)]);
-  const std::uint32_t result = scratch.state;
+  if (seen == kNoPlane) {
+    return std::nullopt;
+  }
+  int leaves = 0;
+  const std::optional<Plane> plane = fit(asked, leaves);
   seen = kDirty;
   if (state.compare_exchange_strong(seen, kFitting, std::memory_order_acquire)) {
-    stored.normal = scratch.normal;
-    stored.centroid_odom_m = scratch.centroid_odom_m;
-    stored.thickness2_m2 = scratch.thickness2_m2;
-    stored.tilt2_rad2 = scratch.tilt2_rad2;
-    state.store(result, std::memory_order_release);
+    asked.plane = plane.value_or(Plane{});
+    asked.changes = 0;
+    asked.tolerated = static_cast<std::uint8_t>(leaves / kLeavesPerChange);
+    state.store(plane ? kPlane : kNoPlane, std::memory_order_release);
   }
-  return result == kPlane ? &scratch : nullptr;
+  return plane;
 }
 
-SurfelMap::Surfel SurfelMap::fit(const Parent& parent) const {
-  Surfel result;
-  result.state = kNoPlane;
+/// `leaves`: that it saw.
+std::optional<SurfelMap::Plane> SurfelMap::fit(const Parent& parent, int& leaves) const {
   if (std::popcount(parent.occupied) < kMinOwnLeaves) {
-    return result;
+    return std::nullopt;
   }
-  const auto plane = plane_of(window_of(parent));
-  if (plane && is_surface(parent, *plane)) {
-    result.normal = plane->normal;
-    result.centroid_odom_m = plane->centroid + centre_of(parent);
-    result.thickness2_m2 = plane->eigenvalues[0] + kThicknessFloor2_m2;
-    result.tilt2_rad2 = static_cast<float>(tilt2_rad2(*plane, result.thickness2_m2, kMinLeaves));
-    result.state = kPlane;
+  const Window window = window_of(parent);
+  leaves = window.all().count;
+  const auto fitted = flat_fit(window);
+  if (!fitted || !is_surface(parent, *fitted)) {
+    return std::nullopt;
   }
-  return result;
+  const double thickness2_m2 = fitted->eigenvalues[0] + kThicknessFloor2_m2;
+  return Plane{fitted->normal.cast<float>(),
+               fitted->centroid.cast<float>(),
+               static_cast<float>(thickness2_m2),
+               static_cast<float>(tilt2_rad2(*fitted, thickness2_m2, kMinLeaves))};
 }
 
 /// Leaf means are smoother than what they are means of: in a crown some always lie on a plane by
 /// chance, and points that match it would only confirm the prediction. Single points tell.
 bool SurfelMap::is_surface(const Parent& parent, const PlaneFit& plane) const {
   int on_plane = 0;
-  for (std::uint32_t left = parent.occupied; left != 0; left &= left - 1) {
-    const auto leaf = static_cast<std::size_t>(std::countr_zero(left));
-    const double distance_m = plane.normal.dot(local(parent.points[leaf]) - plane.centroid);
+  const int count = std::popcount(parent.occupied);
+  for (int i = 0; i < count; ++i) {
+    const Leaf& leaf = leaves_[parent.first_leaf + static_cast<std::uint32_t>(i)];
+    const double distance_m = plane.normal.dot(metres(leaf.point) - plane.centroid);
     on_plane += std::abs(distance_m) < kOnPlane_m ? 1 : 0;
   }
-  return on_plane >= kSurfaceShare * std::popcount(parent.occupied);
+  return on_plane >= kSurfaceShare * count;
 }
 
 SurfelMap::Window SurfelMap::window_of(const Parent& parent) const {
   Window window;
-  for (int d = 0; d < kLeaves; ++d) {
-    const ParentId id = parent.neighbours[static_cast<std::size_t>(d)];
-    if (id == kNoParent) {
-      continue;
-    }
-    const Parent& other = parents_[static_cast<std::size_t>(id)];
+  for (std::uint32_t around = parent.neighbours | 1U << kCentre; around != 0;
+       around &= around - 1) {
+    const int d = std::countr_zero(around);
+    const Parent& other = this->parent(neighbour(parent, d));
     const Eigen::Index axis = axis_of_face(d);
     Moments& group = d == kCentre ? window.own
                      : axis >= 0  ? window.slabs[static_cast<std::size_t>(axis)]
@@ -262,8 +277,9 @@ SurfelMap::Window SurfelMap::window_of(const Parent& parent) const {
     const Eigen::Vector3d shift = parent_m_ * Eigen::Vector3d(d / 9 - 1, d / 3 % 3 - 1, d % 3 - 1);
     for (std::uint32_t left = other.occupied & kTouching[static_cast<std::size_t>(d)]; left != 0;
          left &= left - 1) {
-      const LeafMean& mean = other.means[static_cast<std::size_t>(std::countr_zero(left))];
-      group.add(Eigen::Vector3d(mean.x, mean.y, mean.z) + shift);
+      const auto before =
+          static_cast<std::uint32_t>(std::popcount(other.occupied & ((left & (0U - left)) - 1U)));
+      group.add(metres(leaves_[other.first_leaf + before].mean) + shift);
     }
   }
   return window;
@@ -271,13 +287,8 @@ SurfelMap::Window SurfelMap::window_of(const Parent& parent) const {
 
 /// The widest window that is flat. Where a wall stands on the ground the whole one is not, but the
 /// parent with the leaves behind one pair of its faces may be.
-std::optional<PlaneFit> SurfelMap::plane_of(const Window& window) const {
-  Moments all = window.own;
-  all += window.corners;
-  for (const Moments& slab : window.slabs) {
-    all += slab;
-  }
-  if (auto plane = flat_fit(all)) {
+std::optional<PlaneFit> SurfelMap::flat_fit(const Window& window) const {
+  if (auto plane = flat_fit(window.all())) {
     return plane;
   }
   std::optional<PlaneFit> flattest;

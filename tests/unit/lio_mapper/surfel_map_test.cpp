@@ -162,7 +162,7 @@ TEST(SurfelMap, recovers_an_inclined_plane) {
       ++matched;
       squares += std::pow(plane.normal.dot(p) + plane.offset_m, 2);
       EXPECT_GT(std::abs(plane.normal.dot(normal)), std::cos(kNormal_rad));
-      EXPECT_NEAR(plane.normal.norm(), 1.0, 1e-12);
+      EXPECT_NEAR(plane.normal.norm(), 1.0, 1e-7);  // kept as float
     }
   }
   EXPECT_GT(matched, 990);
@@ -275,12 +275,12 @@ TEST(SurfelMap, sees_hardly_a_plane_in_a_filled_volume) {
   }
 }
 
-/// A trunk, 0.5 m thick: no parent holds a plane, five neighbouring points do.
+/// A trunk, 1.2 m thick: no parent holds a plane, five neighbouring points do.
 TEST(SurfelMap, matches_what_is_bent_by_its_nearest_points) {
   PointCloud trunk;
   for (int i = 0; i < 6000; ++i) {
     const double a = 0.37 * i;
-    trunk.push_back(point_of({5.1 + 0.9 * std::cos(a), 5.2 + 0.9 * std::sin(a), 0.001 * i}));
+    trunk.push_back(point_of({5.1 + 0.6 * std::cos(a), 5.2 + 0.6 * std::sin(a), 0.001 * i}));
   }
   std::array<int, 2> matched{};
   for (const bool nearest_points : {false, true}) {
@@ -290,7 +290,7 @@ TEST(SurfelMap, matches_what_is_bent_by_its_nearest_points) {
     map->insert(trunk);
     for (double a = 0.0; a < 6.28; a += 0.1) {
       PlaneMatch plane;
-      const Eigen::Vector3d p(5.1 + 0.9 * std::cos(a), 5.2 + 0.9 * std::sin(a), 3.0);
+      const Eigen::Vector3d p(5.1 + 0.6 * std::cos(a), 5.2 + 0.6 * std::sin(a), 3.0);
       const bool near =
           map->match(p, plane) && std::abs(plane.normal.dot(p) + plane.offset_m) < 0.1;
       matched[nearest_points ? 1 : 0] += near ? 1 : 0;
@@ -357,7 +357,7 @@ TEST(SurfelMap, freezes_a_leaf_at_its_capacity) {
   map->insert({low, low, high, high, high, high, high});
   ASSERT_EQ(map->size(), 1U);
   EXPECT_NEAR(map->points()[0].z, 0.25, 1e-6);
-  EXPECT_NEAR(map->points()[0].intensity, 3.0, 1e-6);
+  EXPECT_EQ(map->points()[0].intensity, 2.0F);  // of the point nearest the leaf's centre
 }
 
 TEST(SurfelMap, notices_points_that_come_after_a_match) {
@@ -573,15 +573,16 @@ std::optional<BrutePlane> brute_plane(const PointCloud& means,
   return best ? best : brute_fit(own, config);
 }
 
-/// Nearly all of the parent's own points lie on it.
+/// Three quarters of the parent's own points lie on it.
 bool brute_is_surface(const std::vector<Eigen::Vector3d>& own, const BrutePlane& plane) {
   const auto on_plane = std::count_if(own.begin(), own.end(), [&](const Eigen::Vector3d& p) {
     return std::abs(plane.normal.dot(p - plane.centroid)) < 0.1;
   });
-  return static_cast<double>(on_plane) >= 0.95 * static_cast<double>(own.size());
+  return static_cast<double>(on_plane) >= 0.75 * static_cast<double>(own.size());
 }
 
-/// The match's definition: parents within 0.4 m, cheapest plane by distance along and 3 x across.
+/// The match's definition: the own parent's plane when the point lies on it, else parents within
+/// 0.4 m, cheapest plane by distance along and 3 x across.
 std::optional<BrutePlane> brute_match(const PointCloud& means,
                                       const Eigen::Vector3d& p,
                                       const SurfelMapConfig& config) {
@@ -597,6 +598,10 @@ std::optional<BrutePlane> brute_match(const PointCloud& means,
           continue;
         }
         const Eigen::Vector3d offset = p - plane->centroid;
+        const bool own = x == cell(p.x()) && y == cell(p.y()) && z == cell(p.z());
+        if (own && std::abs(plane->normal.dot(offset)) < 0.1) {
+          return plane;
+        }
         const double across = std::abs(plane->normal.dot(offset));
         const double along2 = offset.squaredNorm() - across * across;
         const double cost = along2 + std::pow(3.0 * across, 2);
