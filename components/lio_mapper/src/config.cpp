@@ -152,8 +152,8 @@ void describe_surfel_map(SurfelMapConfig& c, ConfigFields& f) {
   f.flag(
       "nearest_points",
       c.nearest_points,
-      "where no plane holds, as in foliage, a point may match one through the five nearest points; "
-      "it counts as little as it is thick");
+      "where planes leave the pose open, as in foliage, points without one may match one through the "
+      "five nearest points");
   c.leaf_capacity = static_cast<std::size_t>(capacity);
 }
 
