@@ -2,6 +2,7 @@
 // Copyright the Trigpoint developers
 // The process around lio_mapper: points, imu/data and fusion/state_update in; odometry, clouds, the
 // map and its keyframes out.
+#include "trigpoint/base/serial_worker.hpp"
 #include "trigpoint/bus/bus.hpp"
 #include "trigpoint/bus/config.hpp"
 #include "trigpoint/bus/convert.hpp"
@@ -11,7 +12,10 @@
 #include "trigpoint/pipeline/session_parts.hpp"
 #include "trigpoint/shell/shell.hpp"
 
+#include "decode_ahead.hpp"
+
 #include <chrono>
+#include <memory>
 #include <optional>
 
 namespace {
@@ -19,6 +23,11 @@ namespace {
 using namespace trigpoint;
 namespace topics = bus::topics;
 using Clock = std::chrono::steady_clock;
+
+/// Clouds between arrival and matching, six seconds at 10 Hz: who sends more is held back.
+constexpr std::size_t kDecodedClouds = 60;
+/// Scans between matching and disk, ten seconds: then odometry waits for the disk.
+constexpr std::size_t kUnwrittenScans = 100;
 
 constexpr std::chrono::seconds kMapPeriod{5};  ///< the latched local map, while somebody listens
 
@@ -50,7 +59,9 @@ bus::DiagnosticLevel level_of(LioHealth health) {
   }
 }
 
-/// Publishes what the core says; everything but the conversions runs on the loop's thread.
+/// Publishes what the core says. On the loop's thread, except: conversions (the bus's threads),
+/// decoding (a thread of its own; the loop takes each cloud in its turn among the IMU samples as
+/// they arrived) and the session's files (another one, in order).
 class Process {
  public:
   Process(const Settings& settings,
@@ -60,6 +71,7 @@ class Process {
       : log_(log),
         disk_(log),
         core_(settings.mapper, settings.robot),
+        decoding_(settings.mapper, kDecodedClouds),
         participant_(settings.bus, "lio_mapper", log_),
         odometry_(participant_, topics::lio_odometry),
         imu_rate_(participant_, topics::lio_odometry_imu_rate),
@@ -92,21 +104,32 @@ class Process {
     points_.emplace(participant_,
                     topics::points.renamed(settings.robot.points_topic),
                     [this, &loop](sensor_msgs::msg::PointCloud2& m, const bus::MessageInfo&) {
-                      loop.post([this, cloud = bus::from_message(std::move(m))] {
-                        take([&] { return core_.on_cloud(cloud); });
-                      });
+                      if (decoding_.add(bus::from_message(std::move(m)))) {
+                        loop.post([this] { take_cloud(); });
+                      }
                     });
     loop.every(std::chrono::seconds(1), [this] { report_health(); });
     loop.every(kMapPeriod, [this] { publish_map(); });
   }
 
-  /// After the loop: what still waits for IMU samples is processed and written.
+  /// Wakes a thread of the bus that waits to hand a cloud over: it is joined below.
+  ~Process() { decoding_.stop(); }
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  /// After the loop: what still waits for IMU samples is processed, and everything is written.
   void close() {
+    decoding_.stop();
     take([this] { return core_.finish(); });
-    keep([&] { session_->close(core_.status(), core_.checkpoint(), core_.take_rows()); });
+    keep(
+        [this, status = core_.status(), checkpoint = core_.checkpoint(), rows = core_.take_rows()] {
+          session_->close(status, checkpoint, rows);
+        });
     publish_map();
+    writing_.finish();
   }
 
+  /// After close().
   bool failed() const { return disk_.failed(); }
 
  private:
@@ -123,6 +146,12 @@ class Process {
     session_.emplace(session, goes_on ? pipeline::Continuing::kYes : pipeline::Continuing::kNo);
   }
 
+  void take_cloud() {
+    if (auto cloud = decoding_.take()) {
+      take([&] { return core_.on_decoded_cloud(std::move(*cloud)); });
+    }
+  }
+
   template <typename Feed>
   void take(Feed feed) {
     const Clock::time_point before = Clock::now();
@@ -133,7 +162,9 @@ class Process {
     for (lio_mapper::ScanResult& scan : output.scans) {
       scan.status.scan_ms = elapsed_ms / static_cast<double>(output.scans.size());
       publish(scan);
-      keep([&] { session_->on_scan(scan); });
+      keep([this, kept = std::make_shared<const lio_mapper::ScanResult>(std::move(scan))] {
+        session_->on_scan(*kept);
+      });
     }
     if (output.scans.empty() && core_.status().scans_received != reported_received_) {
       publish_status(core_.status());
@@ -197,17 +228,26 @@ class Process {
     diagnostics_.publish(bus::to_message(status.stamp_ns, {&line, 1}));
   }
 
-  template <typename Write>
-  void keep(Write write) {
-    if (session_) {
-      disk_.keep(write);
+  /// Written beside the next scans. What the disk refuses is told by the DiskGuard.
+  void keep(SerialWorker::Job write) {
+    if (!session_) {
+      return;
     }
+    if (writing_.is_full()) {
+      log_({Severity::kWarning,
+            last_.stamp_ns,
+            "disk_lags",
+            "the disk is " + std::to_string(kUnwrittenScans) +
+                " scans behind; odometry waits for it, so that no keyframe is lost"});
+    }
+    writing_.give([this, write = std::move(write)] { disk_.keep(write); });
   }
 
   shell::EventLog log_;
-  shell::DiskGuard disk_;
+  shell::DiskGuard disk_;  ///< used by the writing thread
   lio_mapper::LioMapper core_;
-  std::optional<pipeline::MapperPart> session_;
+  lio_mapper::DecodeAhead decoding_;
+  std::optional<pipeline::MapperPart> session_;  ///< used by the writing thread
   LioStatus last_;
   std::uint64_t reported_scans_{0};
   std::uint64_t reported_received_{0};
@@ -223,6 +263,7 @@ class Process {
   std::optional<bus::Subscription<trigpoint_msgs::msg::StateUpdate>> updates_;
   std::optional<bus::Subscription<sensor_msgs::msg::Imu>> imu_;
   std::optional<bus::Subscription<sensor_msgs::msg::PointCloud2>> points_;
+  SerialWorker writing_{kUnwrittenScans};
 };
 
 int run(const shell::Options& options, const shell::EventLog& log) {

@@ -7,6 +7,7 @@
 
 #include "calibration_report.hpp"
 #include "checkpoint_of.hpp"
+#include "decoded_cloud.hpp"
 #include "downsample.hpp"
 #include "mapper_impl.hpp"
 
@@ -384,16 +385,22 @@ Output LioMapper::on_imu(const ImuSample& sample) {
 }
 
 Output LioMapper::on_cloud(const PointCloudMessage& cloud) {
-  Output output;
-  ++impl_->status.scans_received;
   impl_->begin_stage(Stage::kDecode);
-  auto decoded = impl_->decoder.decode(cloud, output.events);
+  DecodedCloud decoded = impl_->decoder.decode(cloud);
   impl_->begin_stage(Stage::kOutside);
-  if (const auto* refusal = std::get_if<SweepRefusal>(&decoded)) {
-    impl_->refuse_sweep(refusal->code, cloud.stamp_ns, refusal->text, output);
+  return on_decoded_cloud(std::move(decoded));
+}
+
+Output LioMapper::on_decoded_cloud(DecodedCloud cloud) {
+  DecodedCloud::Content& content = *cloud.content_;
+  Output output;
+  output.events = std::move(content.events);
+  ++impl_->status.scans_received;
+  if (const auto* refusal = std::get_if<SweepRefusal>(&content.sweep)) {
+    impl_->refuse_sweep(refusal->code, content.stamp_ns, refusal->text, output);
     return output;
   }
-  impl_->queue(std::move(std::get<Sweep>(decoded)), output);
+  impl_->queue(std::move(std::get<Sweep>(content.sweep)), output);
   impl_->process_what_is_covered(output);
   return output;
 }

@@ -2,6 +2,7 @@
 // Copyright the Trigpoint developers
 #pragma once
 
+#include "trigpoint/lio_mapper/cloud_decoder.hpp"
 #include "trigpoint/lio_mapper/lio_mapper.hpp"
 
 #include "calibration_report.hpp"
@@ -29,7 +30,7 @@ struct LioMapper::Impl {
   Impl(const Config& checked, const RobotConfig& robot)
       : config(checked),
         T_base_lidar(robot.T_base_lidar()),
-        decoder(config.sweep),
+        decoder(config),
         intake(robot.q_base_imu()),
         imu_rate(config.imu, config.imu_rate_odometry_hz),
         calibration_report(config, T_base_lidar),
@@ -67,7 +68,7 @@ struct LioMapper::Impl {
 
   Config config;
   Pose T_base_lidar;
-  SweepDecoder decoder;
+  CloudDecoder decoder;
   ImuIntake intake;
   ImuBuffer imu;
   std::deque<Sweep> sweeps;

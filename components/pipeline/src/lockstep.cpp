@@ -123,6 +123,14 @@ Step Lockstep::step(const recording::LogEntry& entry) {
   return step;
 }
 
+Step Lockstep::step(const recording::LogEntry& entry, lio_mapper::DecodedCloud cloud) {
+  Step step;
+  if (!entry.withheld) {
+    impl_->take(impl_->mapper.on_decoded_cloud(std::move(cloud)), step);
+  }
+  return step;
+}
+
 Step Lockstep::finish() {
   Step step;
   impl_->take(impl_->mapper.finish(), step);

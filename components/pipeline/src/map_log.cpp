@@ -2,11 +2,15 @@
 // Copyright the Trigpoint developers
 #include "trigpoint/pipeline/map_log.hpp"
 
+#include "trigpoint/base/serial_worker.hpp"
 #include "trigpoint/export/session.hpp"
 #include "trigpoint/pipeline/session_parts.hpp"
 
+#include "read_ahead.hpp"
+
 #include <chrono>
 #include <optional>
+#include <utility>
 
 namespace trigpoint::pipeline {
 
@@ -14,6 +18,9 @@ namespace {
 
 namespace file = exporter::session_file;
 using Clock = std::chrono::steady_clock;
+
+/// A minute of the gate's output, ten seconds of scans at most.
+constexpr std::size_t kUnwrittenSteps = 256;
 
 double milliseconds_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
@@ -38,25 +45,18 @@ class Session {
 
   void on_entry(const recording::LogEntry& entry) { log_.on_entry(entry); }
 
-  void on_step(Step& step, const Lockstep& cores, double step_ms) {
-    keep_datum(cores);
-    for (const Odometry& odometry : step.gps_odometry) {
-      gps_.on_odometry(odometry);
-    }
-    for (const GpsStatus& status : step.gps_status) {
-      gps_.on_status(status);
-    }
+  /// Returns at once unless the disk lags far behind; throws when it has refused something.
+  void on_step(Step&& step, const Lockstep& cores, double step_ms) {
     for (lio_mapper::ScanResult& scan : step.scans) {
       scan.status.scan_ms = step_ms / static_cast<double>(step.scans.size());
-      mapper_.on_scan(scan);
     }
-    for (const Odometry& fused : step.fused) {
-      gate_.on_fused(fused);
+    keep_datum(cores);
+    const bool judged = !step.fusion_status.empty();
+    if (judged || !step.gps_odometry.empty() || !step.gps_status.empty() || !step.scans.empty() ||
+        !step.fused.empty()) {
+      disk_.give([this, step = std::move(step)] { write(step); });
     }
-    for (const FusionStatus& status : step.fusion_status) {
-      gate_.on_status(status);
-    }
-    if (!step.fusion_status.empty()) {
+    if (judged) {
       keep_alignment(cores);
     }
   }
@@ -64,6 +64,7 @@ class Session {
   void close(Lockstep& cores, const recording::LogReader& log) {
     keep_datum(cores);
     keep_alignment(cores);
+    disk_.finish();
     gps_.close(cores.gps_status());
     mapper_.close(cores.lio_status(), cores.checkpoint(), cores.take_rows());
     gate_.close();
@@ -77,18 +78,38 @@ class Session {
   std::string path(const char* name) const { return exporter::path_in(folder_, name); }
 
  private:
+  void write(const Step& step) {
+    for (const Odometry& odometry : step.gps_odometry) {
+      gps_.on_odometry(odometry);
+    }
+    for (const GpsStatus& status : step.gps_status) {
+      gps_.on_status(status);
+    }
+    for (const lio_mapper::ScanResult& scan : step.scans) {
+      mapper_.on_scan(scan);
+    }
+    for (const Odometry& fused : step.fused) {
+      gate_.on_fused(fused);
+    }
+    for (const FusionStatus& status : step.fusion_status) {
+      gate_.on_status(status);
+    }
+  }
+
   /// As soon as there is one: a run that is killed keeps its georeference.
   void keep_datum(const Lockstep& cores) {
     const auto datum = cores.datum();
     if (datum && datum->id() != written_datum_) {
-      gps_.on_datum(*datum);
       written_datum_ = datum->id();
+      disk_.give([this, datum] { gps_.on_datum(*datum); });
     }
   }
 
   void keep_alignment(const Lockstep& cores) {
     if (const auto alignment = cores.best_alignment()) {
-      gate_.on_alignment(*alignment, cores.lio_status().aligned);
+      disk_.give([this, alignment, aligned = cores.lio_status().aligned] {
+        gate_.on_alignment(*alignment, aligned);
+      });
     }
   }
 
@@ -97,18 +118,9 @@ class Session {
   GpsPart gps_;
   MapperPart mapper_;
   GatePart gate_;
-  LogPart log_;
+  LogPart log_;                         ///< written by the caller's thread
+  SerialWorker disk_{kUnwrittenSteps};  ///< last: its jobs use the others
 };
-
-/// The next entry, or nothing at the end or where the log breaks off (then `error` says why).
-std::optional<recording::LogEntry> next_entry(recording::LogReader& log, std::string& error) {
-  try {
-    return log.next();
-  } catch (const recording::LogError& broken) {
-    error = broken.what();
-    return std::nullopt;
-  }
-}
 
 void tell(const Events& events, const MapLogOptions& options) {
   if (options.on_event) {
@@ -153,22 +165,29 @@ MapLogResult map_log(recording::LogReader& log,
   const auto run = [&](auto&& advance) {
     const Clock::time_point before = Clock::now();
     Step step = advance();
-    session.on_step(step, cores, milliseconds_since(before));
+    const double step_ms = milliseconds_since(before);
     tell(step.events, options);
+    session.on_step(std::move(step), cores, step_ms);
   };
   tell(recording::fault_events(log.summary()), options);
-  while (const auto entry = next_entry(log, result.log_error)) {
-    tell(log.take_events(), options);
-    session.on_entry(*entry);
-    run([&] { return cores.step(*entry); });
+  ReadAhead ahead(log, configs.lio_mapper);
+  while (auto item = ahead.next()) {
+    tell(item->events, options);
+    session.on_entry(item->entry);
+    run([&] {
+      return item->decoded ? cores.step(item->entry, std::move(*item->decoded))
+                           : cores.step(item->entry);
+    });
     if (options.progress) {
-      options.progress(log.progress());
+      options.progress(item->progress);
     }
     if (options.stop && options.stop()) {
       result.stopped = true;
       break;
     }
   }
+  ahead.stop();
+  result.log_error = ahead.error();
   run([&] { return cores.finish(); });
   tell(log.take_events(), options);
   tell(recording::undecodable_events(log), options);

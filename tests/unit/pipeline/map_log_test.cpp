@@ -9,8 +9,11 @@
 #include "stored_log.hpp"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sqlite3.h>
 
 #include <filesystem>
+#include <iterator>
+#include <stdexcept>
 
 namespace trigpoint::pipeline {
 namespace {
@@ -60,6 +63,66 @@ TEST(MapLog, leaves_the_same_bytes_twice) {
     }
   }
   EXPECT_GE(files, 12U);
+}
+
+TEST(MapLog, finds_the_same_bits_with_reading_and_writing_beside_as_the_cores_in_lock_step) {
+  Lockstep cores(stored_drive().configs);
+  std::vector<lio_mapper::ScanResult> scans;
+  std::vector<Odometry> fused;
+  const auto take = [&](Step step) {
+    std::move(step.scans.begin(), step.scans.end(), std::back_inserter(scans));
+    std::move(step.fused.begin(), step.fused.end(), std::back_inserter(fused));
+  };
+  for (const recording::LogEntry& entry : stored_drive().entries) {
+    take(cores.step(entry));
+  }
+  take(cores.finish());
+  const ScratchFolder folder;
+  run(folder.path(), stored_drive().entries);
+  std::vector<lio_mapper::Keyframe> stored;
+  lio_mapper::read_keyframes(folder.file("keyframes.sqlite"),
+                             [&](const auto& keyframe) { stored.push_back(keyframe); });
+  std::size_t next = 0;
+  for (const lio_mapper::ScanResult& scan : scans) {
+    if (scan.keyframe) {
+      ASSERT_LT(next, stored.size());
+      EXPECT_EQ(stored[next].id, scan.keyframe->id);
+      EXPECT_EQ(stored[next].T_odom_base.p, scan.keyframe->T_odom_base.p);
+      EXPECT_EQ(stored[next].pose_covariance, scan.keyframe->pose_covariance);
+      ++next;
+    }
+  }
+  EXPECT_EQ(next, stored.size());
+  EXPECT_GT(next, 5U);
+  const auto checkpoint = stored_checkpoint(folder.path());
+  ASSERT_TRUE(checkpoint.has_value());
+  EXPECT_EQ(checkpoint->T_odom_base.p, scans.back().odometry.T_frame_child.p);
+  EXPECT_EQ(checkpoint->covariance, cores.checkpoint()->covariance);
+  EXPECT_EQ(exporter::read_trajectory(folder.file("lio.tum")).size(), scans.size());
+  EXPECT_EQ(exporter::read_trajectory(folder.file("fused.tum")).size(), fused.size());
+}
+
+TEST(MapLog, tells_what_the_disk_refused_while_the_cores_went_on) {
+  const ScratchFolder folder;
+  const std::string store = folder.file("keyframes.sqlite");
+  { const lio_mapper::KeyframeWriter writer(store); }
+  sqlite3* database = nullptr;
+  ASSERT_EQ(sqlite3_open(store.c_str(), &database), SQLITE_OK);
+  ASSERT_EQ(sqlite3_exec(database,
+                         "CREATE TRIGGER full BEFORE INSERT ON keyframes WHEN NEW.id = 2 "
+                         "BEGIN SELECT RAISE(FAIL, 'no space left'); END",
+                         nullptr,
+                         nullptr,
+                         nullptr),
+            SQLITE_OK);
+  sqlite3_close(database);
+  try {
+    run(folder.path(), stored_drive().entries);
+    FAIL() << "the failure was kept secret";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("no space left"));
+  }
+  EXPECT_EQ(lio_mapper::read_keyframes(store, [](const auto&) {}), 2U);
 }
 
 TEST(MapLog, accounts_for_every_message_of_the_log) {

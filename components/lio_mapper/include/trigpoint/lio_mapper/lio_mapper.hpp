@@ -7,6 +7,7 @@
 #include "trigpoint/base/messages.hpp"
 #include "trigpoint/base/robot.hpp"
 #include "trigpoint/lio_mapper/checkpoint.hpp"
+#include "trigpoint/lio_mapper/cloud_decoder.hpp"
 #include "trigpoint/lio_mapper/config.hpp"
 #include "trigpoint/lio_mapper/stages.hpp"
 
@@ -77,6 +78,9 @@ class LioMapper {
   Output on_imu(const ImuSample& sample);
   /// A sweep is processed as soon as the IMU covers its last point.
   Output on_cloud(const PointCloudMessage& cloud);
+  /// The same for a cloud that a CloudDecoder with the same configuration has read. Feed a mapper
+  /// in one of the two ways: each decoder learns the meaning of point times for itself.
+  Output on_decoded_cloud(DecodedCloud cloud);
   /// Rows from the gate, at most one set per fix, applied at the fix's stamp.
   Output on_state_update(const StateUpdate& update);
   /// Processes what waits for IMU samples that will not come (end of a log).

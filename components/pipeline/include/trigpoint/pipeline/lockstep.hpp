@@ -53,6 +53,9 @@ class Lockstep {
 
   /// Withheld fixes are not fed to anybody.
   Step step(const recording::LogEntry& entry);
+  /// An entry that is a cloud, as a CloudDecoder with the mapper's configuration has read it; its
+  /// bytes are not looked at. All clouds in this way, or all in the other.
+  Step step(const recording::LogEntry& entry, lio_mapper::DecodedCloud cloud);
   /// End of the log: what still waits in the mapper.
   Step finish();
 

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// The threads of the mapper's process around the core, without a bus: arrival, decoding, matching,
+// writing.
+#include "decode_ahead.hpp"
+
+#include "trigpoint/base/serial_worker.hpp"
+#include "trigpoint/lio_mapper/lio_mapper.hpp"
+
+#include "room_drive.hpp"
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <future>
+#include <thread>
+#include <variant>
+#include <vector>
+
+namespace trigpoint::lio_mapper {
+namespace {
+
+using testing_support::RoomDrive;
+using Input = std::variant<ImuSample, PointCloudMessage>;
+
+/// Three seconds, the third cloud of the drive not a cloud at all.
+const std::vector<Input>& inputs() {
+  static const std::vector<Input> made = [] {
+    constexpr Nanoseconds kImuPeriod_ns = 5'000'000;
+    constexpr int kImuPerSweep = 20;
+    const RoomDrive room;
+    std::vector<Input> all;
+    for (int sweep = 0; sweep < 30; ++sweep) {
+      const Nanoseconds begin_ns = RoomDrive::kEpoch_ns + sweep * kImuPerSweep * kImuPeriod_ns;
+      for (int i = 0; i < kImuPerSweep; ++i) {
+        all.emplace_back(room.imu_at(begin_ns + i * kImuPeriod_ns));
+      }
+      PointCloudMessage cloud = room.sweep_at(begin_ns, 300);
+      if (sweep == 2) {
+        cloud.fields.clear();
+      }
+      all.emplace_back(std::move(cloud));
+    }
+    return all;
+  }();
+  return made;
+}
+
+struct Said {
+  void take(Output output) {
+    for (const Event& event : output.events) {
+      events.push_back(event.code);
+    }
+    for (ScanResult& scan : output.scans) {
+      on_scan(scan);
+      scans.push_back(std::move(scan));
+    }
+  }
+
+  std::vector<ScanResult> scans;
+  std::vector<std::string> events;
+  std::function<void(const ScanResult&)> on_scan{[](const ScanResult&) {}};
+};
+
+Said on_one_thread() {
+  Said said;
+  LioMapper mapper({}, RobotConfig{});
+  for (const Input& input : inputs()) {
+    if (const auto* imu = std::get_if<ImuSample>(&input)) {
+      said.take(mapper.on_imu(*imu));
+    } else {
+      said.take(mapper.on_cloud(std::get<PointCloudMessage>(input)));
+    }
+  }
+  said.take(mapper.finish());
+  return said;
+}
+
+/// As process/main.cpp does it, with a bounded queue for its loop.
+void on_threads(std::size_t most, Said& said) {
+  LioMapper mapper({}, RobotConfig{});
+  DecodeAhead decoding({}, most);
+  BoundedQueue<std::function<void()>> loop(1000);
+  std::thread arrival([&] {
+    for (const Input& input : inputs()) {
+      if (const auto* imu = std::get_if<ImuSample>(&input)) {
+        loop.push([&said, &mapper, imu] { said.take(mapper.on_imu(*imu)); });
+      } else if (decoding.add(std::get<PointCloudMessage>(input))) {
+        loop.push([&] { said.take(mapper.on_decoded_cloud(std::move(*decoding.take()))); });
+      }
+    }
+    loop.close();
+  });
+  while (const auto task = loop.pop()) {
+    (*task)();
+  }
+  arrival.join();
+  said.take(mapper.finish());
+}
+
+void expect_same(const Said& a, const Said& b) {
+  EXPECT_EQ(a.events, b.events);
+  ASSERT_EQ(a.scans.size(), b.scans.size());
+  for (std::size_t i = 0; i < a.scans.size(); ++i) {
+    const Odometry& x = a.scans[i].odometry;
+    const Odometry& y = b.scans[i].odometry;
+    EXPECT_EQ(x.stamp_ns, y.stamp_ns);
+    EXPECT_EQ(x.T_frame_child.p, y.T_frame_child.p);
+    EXPECT_EQ(x.T_frame_child.q.coeffs(), y.T_frame_child.q.coeffs());
+    EXPECT_EQ(x.pose_covariance, y.pose_covariance);
+    EXPECT_EQ(a.scans[i].checkpoint.covariance, b.scans[i].checkpoint.covariance);
+    EXPECT_EQ(a.scans[i].status.scans_received, b.scans[i].status.scans_received);
+  }
+}
+
+class DecodingAhead : public ::testing::TestWithParam<std::size_t> {};
+
+TEST_P(DecodingAhead, gives_the_same_bits_events_and_counts_as_one_thread) {
+  const Said expected = on_one_thread();
+  ASSERT_GE(expected.scans.size(), 25U);
+  ASSERT_FALSE(expected.events.empty());
+  Said threaded;
+  on_threads(GetParam(), threaded);
+  expect_same(expected, threaded);
+}
+
+INSTANTIATE_TEST_SUITE_P(ByRoom, DecodingAhead, ::testing::Values(1, 4, 60));
+
+TEST(DecodeAheadThread, lets_go_of_who_waits_to_hand_a_cloud_over_when_it_is_stopped) {
+  DecodeAhead decoding({}, 1);
+  const PointCloudMessage cloud = RoomDrive().sweep_at(RoomDrive::kEpoch_ns, 10);
+  auto waiting = std::async(std::launch::async, [&] {
+    while (decoding.add(cloud)) {
+    }
+  });
+  decoding.stop();
+  waiting.get();
+}
+
+TEST(WritingBeside, a_disk_that_does_not_answer_delays_no_scan_and_loses_none) {
+  std::promise<void> answer;
+  std::vector<Nanoseconds> written;
+  Said said;
+  SerialWorker disk(100);
+  said.on_scan = [&, answered = answer.get_future().share()](const ScanResult& scan) {
+    disk.give([&written, answered, stamp_ns = scan.odometry.stamp_ns] {
+      answered.wait();
+      written.push_back(stamp_ns);
+    });
+  };
+  on_threads(60, said);  // returns although nothing is written yet
+  answer.set_value();
+  disk.finish();
+  expect_same(on_one_thread(), said);
+  ASSERT_EQ(written.size(), said.scans.size());
+  for (std::size_t i = 0; i < written.size(); ++i) {
+    EXPECT_EQ(written[i], said.scans[i].odometry.stamp_ns);
+  }
+}
+
+}  // namespace
+}  // namespace trigpoint::lio_mapper
