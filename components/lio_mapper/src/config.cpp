@@ -257,6 +257,11 @@ void describe(Config& config, ConfigFields& fields) {
                             "share of the pose's covariance relative to the local map that new map "
                             "inherits, per metre",
                             kNotNegative);
+                   f.number("roughness_per_m",
+                            config.drift.roughness_per_m,
+                            "share of the variance of the map's points across their planes that "
+                            "position gathers, per metre: foliage is rougher than walls",
+                            kNotNegative);
                  });
   fields.section("rows", "GPS rows from the gate", [&](ConfigFields& f) {
     f.number("history_s", config.rows.history_s, "how late a row may come", kPositive);

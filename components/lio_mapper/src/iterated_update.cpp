@@ -81,6 +81,8 @@ UpdateResult iterate(const State& prior,
     result.measured = {measured.information.template topLeftCorner<error::kPose, error::kPose>(),
                        measured.gradient.template head<error::kPose>(),
                        measured.noise,
+                       measured.weight_per_m2,
+                       measured.weighted_thickness2,
                        measured.count};
     result.measured_at = state.T_odom_base;
     state = boxplus(state, step);

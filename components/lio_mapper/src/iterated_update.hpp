@@ -30,6 +30,10 @@ struct Information {
   /// What the noise of the planes' normals adds to the position's information though it tells
   /// nothing; already taken out when the sum is complete.
   Eigen::Matrix3d noise{Eigen::Matrix3d::Zero()};
+  /// Sums of the residuals' weights, and of the variances of the map's points across their planes
+  /// times those.
+  double weight_per_m2{0.0};
+  double weighted_thickness2{0.0};
   std::size_t count{0};  ///< residuals in it
 };
 

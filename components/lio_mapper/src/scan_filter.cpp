@@ -104,7 +104,7 @@ PointCloud transformed(const PointCloud& points, const Pose& T) {
   return moved;
 }
 
-DriftRate drift_rate(const DriftConfig& drift, const Matrix6d& local) {
+DriftRate drift_rate(const DriftConfig& drift, const Matrix6d& local, double roughness2_m2) {
   const double inherited = drift.map_renewal_per_m;
   const auto square = [](double x) { return x * x; };
   const Eigen::SelfAdjointEigenSolver<Matrix3d> axes(local.topLeftCorner<3, 3>());
@@ -114,8 +114,9 @@ DriftRate drift_rate(const DriftConfig& drift, const Matrix6d& local) {
       axes.eigenvectors().transpose();
   const double most_rad2 = square(kMostInherited_rad);
   DriftRate rate;
-  rate.position_m2 =
-      square(drift.position_sigma_m_sqrtm) * Matrix3d::Identity() + inherited * position_m2;
+  const double everywhere_m2 =
+      square(drift.position_sigma_m_sqrtm) + drift.roughness_per_m * roughness2_m2;
+  rate.position_m2 = everywhere_m2 * Matrix3d::Identity() + inherited * position_m2;
   const Eigen::Matrix2d tilt_rad2 = local.block<2, 2>(3, 3);
   rate.tilt_rad2 =
       square(drift.tilt_sigma_rad_sqrtm) * Eigen::Matrix2d::Identity() +
@@ -208,7 +209,7 @@ void ScanFilter::add_drift(Prediction& prediction) {
     return;
   }
   distance_m_ += moved_m;
-  const DriftRate rate = drift_rate(config_.drift, pose_covariance_in_local_map());
+  const DriftRate rate = drift_rate(config_.drift, pose_covariance_in_local_map(), roughness2_m2_);
   Matrix6d at_robot = Matrix6d::Zero();
   at_robot.topLeftCorner<3, 3>() = moved_m * rate.position_m2;
   at_robot.block<2, 2>(3, 3) = moved_m * rate.tilt_rad2;
@@ -251,6 +252,9 @@ UpdateResult ScanFilter::match(const Prediction& prediction,
       thinned_base, *map_, prediction.state.T_base_lidar, config_.matching, *workers_);
   UpdateResult result = update(prediction, matcher);
   outcome.used = result.used;
+  if (result.used && result.measured.weight_per_m2 > 0.0) {
+    roughness2_m2_ = result.measured.weighted_thickness2 / result.measured.weight_per_m2;
+  }
   outcome.matches = result.count;
   outcome.iterations = result.iterations;
   outcome.observability = result.observability;

@@ -152,6 +152,7 @@ class ScanFilter {
   bool aligned_{false};
   double distance_m_{0.0};
   Eigen::Vector3d pruned_at_m_{Eigen::Vector3d::Zero()};
+  double roughness2_m2_{0.0};     ///< of the planes that the last usable scan met
   Matrix6d drift_covariance_{Matrix6d::Zero()};  ///< of odom, about its origin, ROS order
 };
 
@@ -164,11 +165,14 @@ struct DriftRate {
   double yaw_rad2{0.0};
 };
 
-/// The configured walk, and what the map inherits: new map is laid with the error that the pose has
+/// The configured walk, and what the map inherits. New map is laid with the error that the pose has
 /// relative to the old map, so over the length on which the map is renewed its covariance (ROS
-/// order) is passed on once.
+/// order) is passed on once. What is no plane, as foliage, looks different from every place:
+/// neighbouring scans share that error, so it does not average out within a scan, but over the
+/// metres. It goes with the variance of the map's points across their planes.
 DriftRate drift_rate(const DriftConfig& drift,
-                     const Matrix6d& pose_covariance_in_local_map = Matrix6d::Zero());
+                     const Matrix6d& pose_covariance_in_local_map = Matrix6d::Zero(),
+                     double roughness2_m2 = 0.0);
 
 /// Covariance that the drift of heading and position at `p_odom_m` adds to a transform
 /// (yaw, x, y, z) from odom into a frame turned by `R_frame_odom`: the heading turns about the

@@ -157,6 +157,8 @@ void ScanMatcher::add(Residual& r, const Viewpoint& view, PoseInformation& sum) 
   h << r.plane.normal, r.point_base_m.cross(normal_base);
   sum.information.selfadjointView<Eigen::Lower>().rankUpdate(h, weight);
   sum.gradient += weight * r.residual_m * h;
+  sum.weight_per_m2 += weight;
+  sum.weighted_thickness2 += weight * r.plane.thickness2_m2;
   ++sum.count;
   add_noise(r.plane.normal, weight * r.plane.tilt2_rad2, sum.noise);
 }
@@ -193,6 +195,8 @@ void ScanMatcher::add(Residual& r, const Viewpoint& view, PoseAndExtrinsicInform
   h.segment<3>(error::kRotation) = point_base_m.cross(normal_base);
   sum.information.selfadjointView<Eigen::Lower>().rankUpdate(h, weight);
   sum.gradient += weight * r.residual_m * h;
+  sum.weight_per_m2 += weight;
+  sum.weighted_thickness2 += weight * r.plane.thickness2_m2;
   ++sum.count;
   add_noise(normal, weight * r.plane.tilt2_rad2, sum.noise);
 }
@@ -218,6 +222,8 @@ Information<Size> ScanMatcher::sum_of_all(const Viewpoint& view,
     sum.information += part.information;
     sum.gradient += part.gradient;
     sum.noise += part.noise;
+    sum.weight_per_m2 += part.weight_per_m2;
+    sum.weighted_thickness2 += part.weighted_thickness2;
     sum.count += part.count;
   }
   const double scale = std::min(

@@ -97,11 +97,13 @@ struct LocalMapConfig {
 
 /// How fast odom drifts away from the truth: random walk of T_map_odom per metre driven.
 struct DriftConfig {
-  double position_sigma_m_sqrtm{0.003};
+  double position_sigma_m_sqrtm{0.0005};
   double yaw_sigma_rad_sqrtm{5e-5};
   double tilt_sigma_rad_sqrtm{5e-5};
   /// Share of the pose's covariance relative to the local map that the map inherits per metre.
-  double map_renewal_per_m{0.2};
+  double map_renewal_per_m{0.05};
+  /// Share of the variance of the map's points across their planes that the pose gathers per metre.
+  double roughness_per_m{0.015};
 };
 
 struct RowsConfig {
