@@ -313,11 +313,15 @@ int orchestrate(const Options& options, const std::string& program) {
   check_scans(options, *last, checks);
   checks.expect(last->odom_epoch == (killed ? killed->odom_epoch : 0),
                 "odom epoch " + std::to_string(last->odom_epoch));
-  std::printf(
-      "driven %.0f m; keyframes.sqlite %.1f MB; fused.tum off by %.3f m (rms, horizontal)\n",
-      last->distance_m,
-      static_cast<double>(fs::file_size(options.session + "/keyframes.sqlite")) / 1e6,
-      fused_rmse_m(options));
+  const std::string store = options.session + "/" + exporter::session_file::kKeyframes;
+  const lio_mapper::CloudSizes stored = lio_mapper::KeyframeReader(store).cloud_sizes();
+  std::printf("driven %.0f m; fused.tum off by %.3f m (rms, horizontal)\n",
+              last->distance_m,
+              fused_rmse_m(options));
+  std::printf("keyframes.sqlite %.1f MB, its clouds %.1f MB, %.3f of float32\n",
+              static_cast<double>(fs::file_size(store)) / 1e6,
+              static_cast<double>(stored.bytes) / 1e6,
+              stored.ratio());
   return checks.failed() ? 1 : 0;
 }
 

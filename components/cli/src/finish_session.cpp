@@ -6,6 +6,7 @@
 #include "trigpoint/export/correct_session.hpp"
 #include "trigpoint/export/map.hpp"
 #include "trigpoint/export/session.hpp"
+#include "trigpoint/lio_mapper/keyframe_store.hpp"
 
 #include "progress.hpp"
 
@@ -80,6 +81,10 @@ void render_map(const std::string& session) {
                             exporter::past_settings_of(session).lidar_position_base_m});
   std::cerr << "map: " << map.points_moving << " of " << map.points_read
             << " points are of moving objects and left out\n";
+  const lio_mapper::CloudSizes stored = lio_mapper::KeyframeReader(keyframes).cloud_sizes();
+  std::cerr << "keyframes: " << stored.keyframes << ", " << stored.points << " points in "
+            << static_cast<double>(stored.bytes) * 1e-6 << " MB, " << stored.ratio()
+            << " of what float32 would take\n";
   if (!map.remark.empty()) {
     std::cerr << "map: " << map.remark << "\n";
   }

@@ -263,6 +263,18 @@ std::optional<Checkpoint> KeyframeReader::checkpoint() {
   return newest.step() ? std::optional(impl_->checkpoint_of(newest)) : std::nullopt;
 }
 
+CloudSizes KeyframeReader::cloud_sizes() {
+  Statement clouds(impl_->database, "SELECT points_base FROM keyframes");
+  CloudSizes sizes;
+  while (clouds.step()) {
+    ++sizes.keyframes;
+    sizes.bytes += clouds.size(0);
+    sizes.points += impl_->has_all() ? packed_count(clouds.blob(0), clouds.size(0))
+                                     : clouds.size(0) / sizeof(PointXyzi);
+  }
+  return sizes;
+}
+
 std::optional<Pose> KeyframeReader::first_pose(std::uint32_t odom_epoch) {
   Statement first(impl_->database,
                   "SELECT T_odom_base FROM keyframes WHERE odom_epoch = ?1 "

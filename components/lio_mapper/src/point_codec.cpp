@@ -118,12 +118,17 @@ std::vector<std::uint8_t> pack_points(const PointCloud& points) {
   return packed;
 }
 
-PointCloud unpack_points(const void* bytes, std::size_t size) {
+std::size_t packed_count(const void* bytes, std::size_t size) {
   if (size < kHead) {
     throw std::runtime_error("has " + std::to_string(size) + " bytes, at least 4 expected");
   }
   std::uint32_t count = 0;
   std::memcpy(&count, bytes, kHead);
+  return count;
+}
+
+PointCloud unpack_points(const void* bytes, std::size_t size) {
+  const std::size_t count = packed_count(bytes, size);
   const auto* frame = static_cast<const std::uint8_t*>(bytes) + kHead;
   const std::size_t planes_size = kPlanes * count;
   if (count > kMostPoints || ZSTD_getFrameContentSize(frame, size - kHead) != planes_size) {

@@ -267,6 +267,72 @@ TEST_F(KeyframeStore, refuses_what_is_no_database) {
   EXPECT_THAT(error_of_writing(file()), HasSubstr("not a database"));
 }
 
+std::string hex_of(const void* data, std::size_t size) {
+  constexpr const char* kDigits = "0123456789abcdef";
+  std::string hex = "x'";
+  for (std::size_t i = 0; i < size; ++i) {
+    const auto byte = static_cast<const unsigned char*>(data)[i];
+    hex += {kDigits[byte >> 4U], kDigits[byte & 15U]};
+  }
+  return hex + "'";
+}
+
+/// A store as programs wrote it before clouds were packed: KEYFRAMES.md, version 3.
+void write_version_3(const std::string& file, const std::vector<Keyframe>& keyframes) {
+  run_sql(file,
+          "CREATE TABLE keyframes(row INTEGER PRIMARY KEY, id INTEGER NOT NULL, "
+          "stamp_ns INTEGER NOT NULL, odom_epoch INTEGER NOT NULL, T_odom_base BLOB NOT NULL, "
+          "pose_covariance BLOB NOT NULL, aligned INTEGER NOT NULL, T_map_odom BLOB NOT NULL, "
+          "points_base BLOB NOT NULL); PRAGMA user_version=3;");
+  for (const Keyframe& k : keyframes) {
+    const Pose& T = k.T_odom_base;
+    const std::array<double, 7> pose{T.p.x(), T.p.y(), T.p.z(), T.q.x(), T.q.y(), T.q.z(), T.q.w()};
+    const YawPose& Y = k.T_map_odom;
+    const std::array<double, 6> yaw_pose{
+        Y.yaw_rad, Y.p.x(), Y.p.y(), Y.p.z(), Y.tilt_rad.x(), Y.tilt_rad.y()};
+    std::vector<float> points;
+    for (const PointXyzi& p : k.points_base) {
+      points.insert(points.end(), {p.x, p.y, p.z, p.intensity});
+    }
+    run_sql(file,
+            "INSERT INTO keyframes(id, stamp_ns, odom_epoch, T_odom_base, pose_covariance, "
+            "aligned, T_map_odom, points_base) VALUES(" +
+                std::to_string(k.id) + "," + std::to_string(k.stamp_ns) + "," +
+                std::to_string(k.odom_epoch) + "," + hex_of(pose.data(), sizeof pose) + "," +
+                hex_of(k.pose_covariance.data(), 36 * sizeof(double)) + "," +
+                (k.aligned ? "1" : "0") + "," + hex_of(yaw_pose.data(), sizeof yaw_pose) + "," +
+                hex_of(points.data(), points.size() * sizeof(float)) + ")");
+  }
+}
+
+TEST_F(KeyframeStore, of_format_3_is_read_whole_but_neither_resumed_nor_continued) {
+  write_version_3(file(), {keyframe(0), keyframe(1), keyframe(2)});
+  const auto all = read_all(file());
+  ASSERT_EQ(all.size(), 3U);
+  for (int i = 0; i < 3; ++i) {
+    expect_equal(all[static_cast<std::size_t>(i)], keyframe(i));
+  }
+  KeyframeReader reader(file());
+  EXPECT_EQ(reader.at(1)->id, 1U);
+  EXPECT_EQ(reader.visit_places([](const Keyframe&) {}), 3U);
+  EXPECT_EQ(reader.visit_rows([](const StoredRow&) {}), 0U);
+  EXPECT_FALSE(reader.checkpoint().has_value());
+  EXPECT_EQ(reader.cloud_sizes().points, 300U);
+  EXPECT_DOUBLE_EQ(reader.cloud_sizes().ratio(), 1.0);
+  EXPECT_THAT(error_of_writing(file()), HasSubstr("can be read, but a new session needs"));
+  EXPECT_EQ(read_all(file()).size(), 3U);
+}
+
+TEST_F(KeyframeStore, tells_what_its_clouds_take_on_disk) {
+  write(file(), 3);
+  const CloudSizes sizes = KeyframeReader(file()).cloud_sizes();
+  EXPECT_EQ(sizes.keyframes, 3U);
+  EXPECT_EQ(sizes.points, 300U);
+  EXPECT_EQ(sizes.raw_bytes(), 300U * 16U);
+  EXPECT_GT(sizes.bytes, 0U);
+  EXPECT_LT(sizes.ratio(), 1.0);
+}
+
 TEST_F(KeyframeStore, refuses_another_format_version) {
   write(file(), 1);
   run_sql(file(), "PRAGMA user_version=77");

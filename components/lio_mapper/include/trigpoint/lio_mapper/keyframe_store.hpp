@@ -34,6 +34,20 @@ class KeyframeWriter {
   std::unique_ptr<Impl> impl_;
 };
 
+/// What the clouds of a store take on disk.
+struct CloudSizes {
+  std::uint64_t keyframes{0};
+  std::uint64_t points{0};
+  std::uint64_t bytes{0};  ///< as stored, without the database around them
+
+  std::uint64_t raw_bytes() const { return points * sizeof(PointXyzi); }
+
+  /// 1 for float32 x y z intensity; NaN without a point.
+  double ratio() const {
+    return points > 0 ? static_cast<double>(bytes) / static_cast<double>(raw_bytes()) : kNaN;
+  }
+};
+
 /// A store that is open for reading; may be while another writes. All throw std::runtime_error
 /// naming file and cause. Holds one keyframe at a time.
 class KeyframeReader {
@@ -54,6 +68,8 @@ class KeyframeReader {
   std::uint64_t visit_rows(const std::function<void(const StoredRow&)>& visit);
   /// The newest; nothing when the store has none, as one of format 3.
   std::optional<Checkpoint> checkpoint();
+  /// Without unpacking any.
+  CloudSizes cloud_sizes();
   /// Where the epoch's first keyframe was taken.
   std::optional<Pose> first_pose(std::uint32_t odom_epoch);
 
