@@ -39,6 +39,9 @@ struct Run {
   std::vector<evaluation::PosePair> pairs;  ///< fused and truth
   double nees_pose{kNaN};                   ///< mean over fused, per degree of freedom
   double nees_position{kNaN};
+  /// Root mean squares over fused of error and sigma: x y z, roll pitch yaw about the axes of map.
+  Eigen::Matrix<double, 6, 1> rms_error{Eigen::Matrix<double, 6, 1>::Constant(kNaN)};
+  Eigen::Matrix<double, 6, 1> rms_sigma{Eigen::Matrix<double, 6, 1>::Constant(kNaN)};
   std::map<Nanoseconds, Judgement> judgements;  ///< by the fix's stamp
   double process_s{0.0};                        ///< processor time of the three cores
 };

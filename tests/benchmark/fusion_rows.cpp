@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace trigpoint::fusion_table {
 
@@ -332,6 +333,14 @@ Figures consistency(const Drive& drive, const std::string& mode) {
                   figure("ANEES of the position", run.nees_position, {0.3, 2.0})};
   for (Figure& each : figures) {
     each.judged_by_mean = true;
+  }
+  // Which part of the covariance is not honest.
+  const char* const parts[]{"x", "y", "z", "roll", "pitch", "yaw"};
+  for (Eigen::Index i = 0; i < 6; ++i) {
+    const double scale = i < 3 ? 1.0 : 180.0 / std::numbers::pi;
+    const std::string name = std::string(parts[i]) + (i < 3 ? ", m" : ", degrees");
+    figures.push_back(figure("rms error of " + name, scale * run.rms_error[i]));
+    figures.push_back(figure("rms sigma of " + name, scale * run.rms_sigma[i]));
   }
   return figures;
 }

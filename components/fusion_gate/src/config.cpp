@@ -141,7 +141,8 @@ void describe(Config& config, ConfigFields& fields) {
   fields.number("max_inflation", config.max_inflation, "of that factor", {1.0, 1e6});
   fields.number("max_fix_age_s",
                 config.max_fix_age_s,
-                "a fix further behind LIO's newest stamp makes no row",
+                "a fix further behind LIO's newest stamp makes no row; so long a fix that came "
+                "out of order is waited for (below the mapper's rows.history_s)",
                 kPositive);
   fields.number("source_timeout_s",
                 config.source_timeout_s,

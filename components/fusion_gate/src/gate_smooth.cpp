@@ -40,11 +40,6 @@ Witness FusionGate::Impl::witness_of(const AcceptedFix& fix,
 void FusionGate::Impl::judge_values(const AcceptedFix& fix,
                                     const PoseBuffer::Sample& at_fix,
                                     Output& out) {
-  verdict_changed = true;
-  if (is_replacement_awaited(out)) {
-    verdicts.record(fix.stamp_ns, false, "alignment", "waiting for the mapper to take T_map_odom");
-    return;
-  }
   const Witness witness = witness_of(fix, at_fix);
   const MonitorOutcome outcome = monitor.judge(witness, *lio);
   tell_changes(outcome, out);
@@ -64,7 +59,7 @@ void FusionGate::Impl::judge_values(const AcceptedFix& fix,
     return;
   }
   go_back(outcome, witness, out);
-  const AxisChoices choices = choose_smoothly();
+  const AxisChoices choices = choose_smoothly(variance_of(fix));
   for (std::size_t axis = 0; axis < 3; ++axis) {
     sigma_passes[axis] = choices[axis].sigma_m <= choices[axis].threshold_m;
   }
@@ -136,9 +131,7 @@ bool FusionGate::Impl::is_replacement_awaited(Output& out) {
   return false;
 }
 
-/// As of now: sigmas grow between fixes.
-AxisChoices FusionGate::Impl::choose_smoothly() const {
-  const Eigen::Vector3d reported_m2 = gps_variance_m2();
+AxisChoices FusionGate::Impl::choose_smoothly(const Eigen::Vector3d& reported_m2) const {
   const Eigen::Vector3d scatter_m2 = monitor.scatter_map_m2(*lio);
   const Trust& level = monitor.trust(Part::kLevel);
   AxisChoices choices;

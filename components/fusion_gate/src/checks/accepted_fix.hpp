@@ -16,6 +16,7 @@ struct AcceptedFix {
   Nanoseconds stamp_ns{0};
   Eigen::Vector3d antenna_map_m{Eigen::Vector3d::Constant(kNaN)};
   Eigen::Matrix3d covariance_map_m2{Eigen::Matrix3d::Identity() * kUnknownVariance};
+  bool is_recorded{false};  ///< told of in a record of its own
 };
 
 /// Why something is refused: `code` is short, stable and counted, `reason` is the sentence.

@@ -56,15 +56,15 @@ struct Config {
   double min_sigma_m{0.02};                  ///< floor of a fix's sigma
   double gps_correlation_time_s{5.0};        ///< row covariance x (1 + 2 tau / dt)
   double max_inflation{100.0};               ///< of that factor
-  double max_fix_age_s{1.0};                 ///< against LIO's newest stamp
-  double source_timeout_s{1.0};              ///< a GPS writer not heard for longer is stale
-  double source_hold_s{0.5};                 ///< a healthier one must stay so for this long
-  double lio_timeout_s{1.0};                 ///< then the GPS odometry carries fusion/odometry
-  double gps_only_after_s{10.0};             ///< the same where there has never been a LIO
-  double imu_rate_timeout_s{0.5};            ///< then lio/odometry carries fusion/odometry
-  double status_period_s{0.2};               ///< of fusion/status between fixes, data time
-  double foreign_after_s{2.0};               ///< a GPS writer without gps/status is foreign then
-  double unknown_fix_sigma_m{3.0};           ///< of a raw fix that says nothing about itself
+  double max_fix_age_s{1.3};  ///< against LIO's newest stamp; so long an earlier one is waited for
+  double source_timeout_s{1.0};     ///< a GPS writer not heard for longer is stale
+  double source_hold_s{0.5};        ///< a healthier one must stay so for this long
+  double lio_timeout_s{1.0};        ///< then the GPS odometry carries fusion/odometry
+  double gps_only_after_s{10.0};    ///< the same where there has never been a LIO
+  double imu_rate_timeout_s{0.5};   ///< then lio/odometry carries fusion/odometry
+  double status_period_s{0.2};      ///< of fusion/status between fixes, data time
+  double foreign_after_s{2.0};      ///< a GPS writer without gps/status is foreign then
+  double unknown_fix_sigma_m{3.0};  ///< of a raw fix that says nothing about itself
   AlignmentConfig alignment;
   SmoothConfig smooth;
 };
