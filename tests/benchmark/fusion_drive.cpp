@@ -116,6 +116,7 @@ class Cores {
       }
     }
     for (const FusionStatus& status : step.fusion_status) {
+      run_.verdicts = status.verdicts;
       for (const FixVerdict& verdict : status.judged) {
         take(verdict);
       }

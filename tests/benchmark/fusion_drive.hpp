@@ -42,6 +42,7 @@ struct Run {
   /// Root mean squares over fused of error and sigma: x y z, roll pitch yaw about the axes of map.
   Eigen::Matrix<double, 6, 1> rms_error{Eigen::Matrix<double, 6, 1>::Constant(kNaN)};
   Eigen::Matrix<double, 6, 1> rms_sigma{Eigen::Matrix<double, 6, 1>::Constant(kNaN)};
+  std::vector<NamedCount> verdicts;             ///< of all fixes, by code
   std::map<Nanoseconds, Judgement> judgements;  ///< by the fix's stamp
   double process_s{0.0};                        ///< processor time of the three cores
 };

@@ -2,6 +2,8 @@
 // Copyright the Trigpoint developers
 #include "fusion_rows.hpp"
 
+#include "fusion_map.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -295,6 +297,14 @@ std::vector<Window> unsettled(const Drive& drive, const Run& run, const Run& sor
   return windows;
 }
 
+std::string text_of(const std::vector<NamedCount>& counts) {
+  std::string text;
+  for (const NamedCount& count : counts) {
+    text += (text.empty() ? "" : ", ") + count.name + " " + std::to_string(count.count);
+  }
+  return text;
+}
+
 Figures against_sorted(const Drive& drive, const std::string& mode) {
   const Run& run = drive.runs.at(mode);
   const Run& sorted = drive.sorted_runs.at(mode);
@@ -310,13 +320,20 @@ Figures against_sorted(const Drive& drive, const std::string& mode) {
     if (ours.is_used() != theirs.is_used() || ours.moves != theirs.moves) {
       ++differing;
       words =
-          words.empty() ? "'" + ours.reason + "' where sorted says '" + theirs.reason + "'" : words;
+          words.empty()
+              ? "'" + ours.reason + "' where sorted says '" + theirs.reason + "', of the fix at " +
+                    std::to_string(to_seconds(fix.stamp_ns - drive.truth->first_ns())) + " s of " +
+                    std::to_string(to_seconds(drive.truth->last_ns() - drive.truth->first_ns()))
+              : words;
     }
   }
   Figure verdicts = figure("fixes judged otherwise than in the sorted run",
                            static_cast<double>(differing),
                            at_most(0.0));
   verdicts.words = words;
+  if (differing > 0) {
+    verdicts.words += "; all: " + text_of(run.verdicts) + "; sorted: " + text_of(sorted.verdicts);
+  }
   return {verdicts,
           figure("largest distance from the sorted run after 2 s, m",
                  evaluation::largest_difference_m(
@@ -345,6 +362,21 @@ Figures consistency(const Drive& drive, const std::string& mode) {
   return figures;
 }
 
+using MapScore = std::function<Figures(const MapTask&)>;
+
+MapScore across(const std::string& scenario) {
+  return [scenario](const MapTask& task) { return map_across_outages(task, scenario); };
+}
+
+/// A row that makes its own drives.
+Row map_row(const std::string& name, const std::string& what, MapScore score) {
+  Row row;
+  row.scenario = name;
+  row.what = what;
+  row.score_map = std::move(score);
+  return row;
+}
+
 }  // namespace
 
 bool Bound::holds(double value) const {
@@ -368,6 +400,12 @@ const std::vector<Row>& rows() {
       {"campus+shuffled_fixes", "late, shuffled and duplicated", against_sorted, true},
       {"campus+duplicated_fixes", "duplicated", against_sorted, true},
       {"short", "consistency over short runs", consistency, false, true},
+      map_row("map indoor_60", "the same street before and after an outage", across("indoor_60")),
+      map_row("map campus_twice", "streets driven twice", across("campus_twice")),
+      map_row("map long_drive", "three outages, streets driven twice", across("long_drive")),
+      map_row("map second_run", "second run from a stored session", map_of_second_run),
+      map_row("map merged", "two sessions merged", map_of_merged_sessions),
+      map_row("map street_traffic", "walkers and cars", map_without_traffic),
   };
   return all;
 }

@@ -218,9 +218,9 @@ bool is_facade(const Plane& plane, const Points& inliers, const Points& window) 
 /// The wall of a cell; nullopt when it holds none.
 std::optional<Plane> facade_in(const Points& points) {
   const std::optional<Plane> plane = find_plane(points);
-  const bool is_wall = plane && is_facade(*plane,
-                                          near_to(*plane, points, kInlier_m),
-                                          near_to(*plane, points, kWindow_m));
+  const bool is_wall =
+      plane &&
+      is_facade(*plane, near_to(*plane, points, kInlier_m), near_to(*plane, points, kWindow_m));
   return is_wall ? plane : std::nullopt;
 }
 

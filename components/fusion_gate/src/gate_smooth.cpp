@@ -16,6 +16,18 @@ constexpr std::size_t kRawFixesKept = 64;
 constexpr double kReplacementTimeout_s = 1.0;
 constexpr double kWorthGoingBack_m = 0.01;
 
+/// A fix's covariance with the variances that were measured. Less than was said only as far as
+/// filters say too much on purpose: what is slow in the error does not scatter.
+Eigen::Matrix3d as_measured(const Eigen::Matrix3d& said_m2, const Eigen::Vector3d& scatter_m2) {
+  Eigen::Vector3d scale = Eigen::Vector3d::Ones();
+  for (int axis = 0; axis < 3; ++axis) {
+    if (std::isfinite(scatter_m2[axis])) {
+      scale[axis] = std::sqrt(std::max(kFilterMargin, scatter_m2[axis] / said_m2(axis, axis)));
+    }
+  }
+  return scale.asDiagonal() * said_m2 * scale.asDiagonal();
+}
+
 Part part_of(int axis) {
   return axis < 2 ? Part::kLevel : Part::kHeight;
 }
@@ -65,8 +77,7 @@ void FusionGate::Impl::judge_values(const AcceptedFix& fix,
   }
   if (any_fused(choices) || outcome.trusted[0]) {
     AcceptedFix weighted = fix;
-    weighted.covariance_map_m2.diagonal() +=
-        (monitor.scatter_map_m2(*lio) - fix.covariance_map_m2.diagonal()).cwiseMax(0.0);
+    weighted.covariance_map_m2 = as_measured(fix.covariance_map_m2, monitor.scatter_map_m2(*lio));
     send_rows(weighted, choices, out);
     return;
   }
