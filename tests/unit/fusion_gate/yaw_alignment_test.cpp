@@ -4,6 +4,7 @@
 
 #include "trigpoint/base/so3.hpp"
 
+#include "checks/accepted_fix.hpp"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
