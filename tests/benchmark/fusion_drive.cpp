@@ -8,6 +8,7 @@
 #include "trigpoint/pipeline/lockstep.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <ctime>
 #include <utility>
 #include <variant>
@@ -102,6 +103,10 @@ class Cores {
   }
 
   void take(const pipeline::Step& step) {
+    for (const Odometry& gps : step.gps_odometry) {
+      const double variance_m2 = gps.pose_covariance.diagonal().head<2>().maxCoeff();
+      run_.gps_sigmas.push_back({gps.stamp_ns, std::sqrt(variance_m2)});
+    }
     for (const Odometry& odometry : step.lio_imu_rate) {
       run_.odom.push_back({odometry.stamp_ns, odometry.T_frame_child});
     }

@@ -32,7 +32,7 @@ using pipeline::UseOfStored;
 constexpr double kMapVoxel_m = 0.1;
 constexpr double kSameSurface_m = 0.05;
 constexpr double kRemovedShare_percent = 90.0;
-constexpr double kSamePoint_m = 0.1;  // range noise, and the pose of the sweep
+constexpr double kSamePoint_m = 0.1;                // range noise, and the pose of the sweep
 constexpr Nanoseconds kLeastSweep_ns = 50'000'000;  // from the first firing to the last
 constexpr Nanoseconds kMostSweep_ns = 150'000'000;
 constexpr const char* kSecondDay = "indoor_60+second_day";

@@ -30,6 +30,10 @@ constexpr double kWrong_m = 0.3;
 /// From here on a wandering fix is at fault.
 constexpr double kWandered_m = 0.05;
 constexpr double kFaultError_m = 0.5;
+constexpr double kSpike_m = 0.5;  // threshold of Algorithm I
+constexpr double kAtStart_s = 10.0;
+constexpr double kStartError_m = 0.3;
+constexpr double kRealigned_m = 20.0;
 constexpr double kOverGps_m = 0.2;
 constexpr double kHeightFaultRms_m = 0.08;
 constexpr double kHeightShare = 0.003;
@@ -123,8 +127,45 @@ Figures outage(const Drive& drive, const std::string& mode) {
   return figures;
 }
 
+/// Stretches in which the GPS filter says that it is worse than Algorithm I's threshold, since the
+/// pose in map is known.
+std::vector<Window> uncertainty_spikes(const Run& run) {
+  std::vector<Window> spikes;
+  for (const GpsSigma& sigma : run.gps_sigmas) {
+    const bool counts = !run.fused.empty() && sigma.stamp_ns >= run.fused.front().stamp_ns;
+    if (!counts || !(sigma.horizontal_m > kSpike_m)) {
+      continue;
+    }
+    if (spikes.empty() || sigma.stamp_ns - spikes.back().end_ns > kSettled_ns) {
+      spikes.push_back({sigma.stamp_ns, sigma.stamp_ns});
+    }
+    spikes.back().end_ns = sigma.stamp_ns;
+  }
+  return spikes;
+}
+
+/// As in the paper's Fig. 11: one spike an outage, and none elsewhere.
+Figure spikes(const Drive& drive, const Run& run) {
+  const auto found = uncertainty_spikes(run);
+  const auto windows = outages(drive);
+  const auto begins_in = [&](const Window& outage) {
+    return std::count_if(found.begin(), found.end(), [&](const Window& spike) {
+      return spike.begin_ns >= outage.begin_ns && spike.begin_ns < outage.end_ns;
+    });
+  };
+  Figure figure_of = figure("spikes of the GPS filter's sigma above 0.5 m (outages: " +
+                                std::to_string(windows.size()) + ")",
+                            static_cast<double>(found.size()));
+  figure_of.met = found.size() == windows.size() &&
+                  std::all_of(windows.begin(), windows.end(), [&](const Window& outage) {
+                    return begins_in(outage) == 1;
+                  });
+  return figure_of;
+}
+
 Figures long_drive(const Drive& drive, const std::string& mode) {
   Figures figures = whole_drive(drive, drive.runs.at(mode), 0.15);
+  figures.push_back(spikes(drive, drive.runs.at(mode)));
   const Figures of_outages = outage(drive, mode);
   figures.insert(figures.end(), of_outages.begin(), of_outages.end());
   return figures;
@@ -344,6 +385,39 @@ Figures against_sorted(const Drive& drive, const std::string& mode) {
           largest_step(drive, run)};
 }
 
+/// How a start with something wrong ends: aligned, and right from then on.
+Figures start(const Drive& drive, const std::string& mode) {
+  const Run& run = drive.runs.at(mode);
+  const auto wrong = stretches(drive, is_wrong);
+  const Nanoseconds begin_ns = drive.truth->first_ns();
+  const bool wrong_first =
+      !wrong.empty() && to_seconds(wrong.front().begin_ns - begin_ns) < kAtStart_s;
+  const Nanoseconds right_ns = wrong_first ? wrong.front().end_ns : begin_ns;
+  const auto right_s = evaluation::time_to_return_s(run.pairs, right_ns, kStartError_m);
+  double way_m = kNaN;
+  if (right_s) {
+    const auto end_ns = right_ns + from_seconds(*right_s);
+    way_m = 0.0;
+    for (Nanoseconds ns = right_ns; ns + kStepInterval_ns < end_ns; ns += kStepInterval_ns) {
+      way_m +=
+          (drive.truth->at(ns + kStepInterval_ns).T_map_base.p - drive.truth->at(ns).T_map_base.p)
+              .norm();
+    }
+  }
+  Figures figures{first_pose(drive, run),
+                  figure(wrong_first ? "m driven after the wrong fix's end until within 0.3 m"
+                                     : "m driven until within 0.3 m",
+                         way_m,
+                         wrong_first ? at_most(kRealigned_m) : Bound{}),
+                  figure("error at the end, m",
+                         run.pairs.empty()
+                             ? kNaN
+                             : (run.pairs.back().estimate.p - run.pairs.back().reference.p).norm(),
+                         at_most(kStartError_m)),
+                  largest_step(drive, run)};
+  return figures;
+}
+
 Figures consistency(const Drive& drive, const std::string& mode) {
   const Run& run = drive.runs.at(mode);
   Figures figures{figure("ANEES of the pose (1 = honest)", run.nees_pose, {0.3, 2.0}),
@@ -399,6 +473,9 @@ const std::vector<Row>& rows() {
       {"campus+late_fixes", "fixes 500 ms late", against_sorted, true},
       {"campus+shuffled_fixes", "late, shuffled and duplicated", against_sorted, true},
       {"campus+duplicated_fixes", "duplicated", against_sorted, true},
+      {"campus_late_gps", "start: GPS first after 300 m", start},
+      {"indoor_start", "start inside a building", start},
+      {"campus+wrong_start", "start: a wrong fix", start},
       {"short", "consistency over short runs", consistency, false, true},
       map_row("map indoor_60", "the same street before and after an outage", across("indoor_60")),
       map_row("map campus_twice", "streets driven twice", across("campus_twice")),
