@@ -3,10 +3,12 @@
 #include "fusion_drive.hpp"
 
 #include "trigpoint/base/config.hpp"
+#include "trigpoint/base/so3.hpp"
 #include "trigpoint/geodesy/local_frame.hpp"
 #include "trigpoint/pipeline/lockstep.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <ctime>
 #include <utility>
 #include <variant>
@@ -88,6 +90,8 @@ class Cores {
     if (nees_count_ > 0) {
       run_.nees_pose = nees_sum_.pose / static_cast<double>(nees_count_);
       run_.nees_position = nees_sum_.position / static_cast<double>(nees_count_);
+      run_.rms_error = (error_sum_ / static_cast<double>(nees_count_)).cwiseSqrt();
+      run_.rms_sigma = (variance_sum_ / static_cast<double>(nees_count_)).cwiseSqrt();
     }
     return std::move(run_);
   }
@@ -99,6 +103,10 @@ class Cores {
   }
 
   void take(const pipeline::Step& step) {
+    for (const Odometry& gps : step.gps_odometry) {
+      const double variance_m2 = gps.pose_covariance.diagonal().head<2>().maxCoeff();
+      run_.gps_sigmas.push_back({gps.stamp_ns, std::sqrt(variance_m2)});
+    }
     for (const Odometry& odometry : step.lio_imu_rate) {
       run_.odom.push_back({odometry.stamp_ns, odometry.T_frame_child});
     }
@@ -113,7 +121,10 @@ class Cores {
       }
     }
     for (const FusionStatus& status : step.fusion_status) {
-      take(status.verdict);
+      run_.verdicts = status.verdicts;
+      for (const FixVerdict& verdict : status.judged) {
+        take(verdict);
+      }
     }
   }
 
@@ -125,6 +136,11 @@ class Cores {
     nees_sum_.pose += nees.pose;
     nees_sum_.position += nees.position;
     ++nees_count_;
+    const Eigen::Quaterniond turn = fused.T_frame_child.q * reference.q.conjugate();
+    Eigen::Matrix<double, 6, 1> error;
+    error << fused.T_frame_child.p - reference.p, so3_log(turn.normalized());
+    error_sum_ += error.cwiseAbs2();
+    variance_sum_ += fused.pose_covariance.diagonal();
   }
 
   /// The first verdict on a fix stands: a copy of it that comes later is another message.
@@ -143,6 +159,8 @@ class Cores {
   std::shared_ptr<const simulator::Truth> truth_;
   Run run_;
   evaluation::Nees nees_sum_;
+  Eigen::Matrix<double, 6, 1> error_sum_{Eigen::Matrix<double, 6, 1>::Zero()};
+  Eigen::Matrix<double, 6, 1> variance_sum_{Eigen::Matrix<double, 6, 1>::Zero()};
   std::size_t nees_count_{0};
 };
 

@@ -32,6 +32,12 @@ struct Judgement {
   bool is_used() const { return used || moves[0] || moves[1] || moves[2]; }
 };
 
+/// How well gps/odometry says that it knows where it is.
+struct GpsSigma {
+  Nanoseconds stamp_ns{0};
+  double horizontal_m{kNaN};
+};
+
 /// What one mode made of the drive.
 struct Run {
   evaluation::Trajectory fused;             ///< as published online, at IMU rate
@@ -39,6 +45,11 @@ struct Run {
   std::vector<evaluation::PosePair> pairs;  ///< fused and truth
   double nees_pose{kNaN};                   ///< mean over fused, per degree of freedom
   double nees_position{kNaN};
+  /// Root mean squares over fused of error and sigma: x y z, roll pitch yaw about the axes of map.
+  Eigen::Matrix<double, 6, 1> rms_error{Eigen::Matrix<double, 6, 1>::Constant(kNaN)};
+  Eigen::Matrix<double, 6, 1> rms_sigma{Eigen::Matrix<double, 6, 1>::Constant(kNaN)};
+  std::vector<GpsSigma> gps_sigmas;
+  std::vector<NamedCount> verdicts;             ///< of all fixes, by code
   std::map<Nanoseconds, Judgement> judgements;  ///< by the fix's stamp
   double process_s{0.0};                        ///< processor time of the three cores
 };

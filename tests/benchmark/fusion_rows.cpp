@@ -2,8 +2,11 @@
 // Copyright the Trigpoint developers
 #include "fusion_rows.hpp"
 
+#include "fusion_map.hpp"
+
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace trigpoint::fusion_table {
 
@@ -27,6 +30,10 @@ constexpr double kWrong_m = 0.3;
 /// From here on a wandering fix is at fault.
 constexpr double kWandered_m = 0.05;
 constexpr double kFaultError_m = 0.5;
+constexpr double kSpike_m = 0.5;  // threshold of Algorithm I
+constexpr double kAtStart_s = 10.0;
+constexpr double kStartError_m = 0.3;
+constexpr double kRealigned_m = 20.0;
 constexpr double kOverGps_m = 0.2;
 constexpr double kHeightFaultRms_m = 0.08;
 constexpr double kHeightShare = 0.003;
@@ -120,8 +127,45 @@ Figures outage(const Drive& drive, const std::string& mode) {
   return figures;
 }
 
+/// Stretches in which the GPS filter says that it is worse than Algorithm I's threshold, since the
+/// pose in map is known.
+std::vector<Window> uncertainty_spikes(const Run& run) {
+  std::vector<Window> spikes;
+  for (const GpsSigma& sigma : run.gps_sigmas) {
+    const bool counts = !run.fused.empty() && sigma.stamp_ns >= run.fused.front().stamp_ns;
+    if (!counts || !(sigma.horizontal_m > kSpike_m)) {
+      continue;
+    }
+    if (spikes.empty() || sigma.stamp_ns - spikes.back().end_ns > kSettled_ns) {
+      spikes.push_back({sigma.stamp_ns, sigma.stamp_ns});
+    }
+    spikes.back().end_ns = sigma.stamp_ns;
+  }
+  return spikes;
+}
+
+/// As in the paper's Fig. 11: one spike an outage, and none elsewhere.
+Figure spikes(const Drive& drive, const Run& run) {
+  const auto found = uncertainty_spikes(run);
+  const auto windows = outages(drive);
+  const auto begins_in = [&](const Window& outage) {
+    return std::count_if(found.begin(), found.end(), [&](const Window& spike) {
+      return spike.begin_ns >= outage.begin_ns && spike.begin_ns < outage.end_ns;
+    });
+  };
+  Figure figure_of = figure("spikes of the GPS filter's sigma above 0.5 m (outages: " +
+                                std::to_string(windows.size()) + ")",
+                            static_cast<double>(found.size()));
+  figure_of.met = found.size() == windows.size() &&
+                  std::all_of(windows.begin(), windows.end(), [&](const Window& outage) {
+                    return begins_in(outage) == 1;
+                  });
+  return figure_of;
+}
+
 Figures long_drive(const Drive& drive, const std::string& mode) {
   Figures figures = whole_drive(drive, drive.runs.at(mode), 0.15);
+  figures.push_back(spikes(drive, drive.runs.at(mode)));
   const Figures of_outages = outage(drive, mode);
   figures.insert(figures.end(), of_outages.begin(), of_outages.end());
   return figures;
@@ -294,6 +338,14 @@ std::vector<Window> unsettled(const Drive& drive, const Run& run, const Run& sor
   return windows;
 }
 
+std::string text_of(const std::vector<NamedCount>& counts) {
+  std::string text;
+  for (const NamedCount& count : counts) {
+    text += (text.empty() ? "" : ", ") + count.name + " " + std::to_string(count.count);
+  }
+  return text;
+}
+
 Figures against_sorted(const Drive& drive, const std::string& mode) {
   const Run& run = drive.runs.at(mode);
   const Run& sorted = drive.sorted_runs.at(mode);
@@ -309,13 +361,20 @@ Figures against_sorted(const Drive& drive, const std::string& mode) {
     if (ours.is_used() != theirs.is_used() || ours.moves != theirs.moves) {
       ++differing;
       words =
-          words.empty() ? "'" + ours.reason + "' where sorted says '" + theirs.reason + "'" : words;
+          words.empty()
+              ? "'" + ours.reason + "' where sorted says '" + theirs.reason + "', of the fix at " +
+                    std::to_string(to_seconds(fix.stamp_ns - drive.truth->first_ns())) + " s of " +
+                    std::to_string(to_seconds(drive.truth->last_ns() - drive.truth->first_ns()))
+              : words;
     }
   }
   Figure verdicts = figure("fixes judged otherwise than in the sorted run",
                            static_cast<double>(differing),
                            at_most(0.0));
   verdicts.words = words;
+  if (differing > 0) {
+    verdicts.words += "; all: " + text_of(run.verdicts) + "; sorted: " + text_of(sorted.verdicts);
+  }
   return {verdicts,
           figure("largest distance from the sorted run after 2 s, m",
                  evaluation::largest_difference_m(
@@ -326,6 +385,39 @@ Figures against_sorted(const Drive& drive, const std::string& mode) {
           largest_step(drive, run)};
 }
 
+/// How a start with something wrong ends: aligned, and right from then on.
+Figures start(const Drive& drive, const std::string& mode) {
+  const Run& run = drive.runs.at(mode);
+  const auto wrong = stretches(drive, is_wrong);
+  const Nanoseconds begin_ns = drive.truth->first_ns();
+  const bool wrong_first =
+      !wrong.empty() && to_seconds(wrong.front().begin_ns - begin_ns) < kAtStart_s;
+  const Nanoseconds right_ns = wrong_first ? wrong.front().end_ns : begin_ns;
+  const auto right_s = evaluation::time_to_return_s(run.pairs, right_ns, kStartError_m);
+  double way_m = kNaN;
+  if (right_s) {
+    const auto end_ns = right_ns + from_seconds(*right_s);
+    way_m = 0.0;
+    for (Nanoseconds ns = right_ns; ns + kStepInterval_ns < end_ns; ns += kStepInterval_ns) {
+      way_m +=
+          (drive.truth->at(ns + kStepInterval_ns).T_map_base.p - drive.truth->at(ns).T_map_base.p)
+              .norm();
+    }
+  }
+  Figures figures{first_pose(drive, run),
+                  figure(wrong_first ? "m driven after the wrong fix's end until within 0.3 m"
+                                     : "m driven until within 0.3 m",
+                         way_m,
+                         wrong_first ? at_most(kRealigned_m) : Bound{}),
+                  figure("error at the end, m",
+                         run.pairs.empty()
+                             ? kNaN
+                             : (run.pairs.back().estimate.p - run.pairs.back().reference.p).norm(),
+                         at_most(kStartError_m)),
+                  largest_step(drive, run)};
+  return figures;
+}
+
 Figures consistency(const Drive& drive, const std::string& mode) {
   const Run& run = drive.runs.at(mode);
   Figures figures{figure("ANEES of the pose (1 = honest)", run.nees_pose, {0.3, 2.0}),
@@ -333,7 +425,30 @@ Figures consistency(const Drive& drive, const std::string& mode) {
   for (Figure& each : figures) {
     each.judged_by_mean = true;
   }
+  // Which part of the covariance is not honest.
+  const char* const parts[]{"x", "y", "z", "roll", "pitch", "yaw"};
+  for (Eigen::Index i = 0; i < 6; ++i) {
+    const double scale = i < 3 ? 1.0 : 180.0 / std::numbers::pi;
+    const std::string name = std::string(parts[i]) + (i < 3 ? ", m" : ", degrees");
+    figures.push_back(figure("rms error of " + name, scale * run.rms_error[i]));
+    figures.push_back(figure("rms sigma of " + name, scale * run.rms_sigma[i]));
+  }
   return figures;
+}
+
+using MapScore = std::function<Figures(const MapTask&)>;
+
+MapScore across(const std::string& scenario) {
+  return [scenario](const MapTask& task) { return map_across_outages(task, scenario); };
+}
+
+/// A row that makes its own drives.
+Row map_row(const std::string& name, const std::string& what, MapScore score) {
+  Row row;
+  row.scenario = name;
+  row.what = what;
+  row.score_map = std::move(score);
+  return row;
 }
 
 }  // namespace
@@ -358,7 +473,16 @@ const std::vector<Row>& rows() {
       {"campus+late_fixes", "fixes 500 ms late", against_sorted, true},
       {"campus+shuffled_fixes", "late, shuffled and duplicated", against_sorted, true},
       {"campus+duplicated_fixes", "duplicated", against_sorted, true},
+      {"campus_late_gps", "start: GPS first after 300 m", start},
+      {"indoor_start", "start inside a building", start},
+      {"campus+wrong_start", "start: a wrong fix", start},
       {"short", "consistency over short runs", consistency, false, true},
+      map_row("map indoor_60", "the same street before and after an outage", across("indoor_60")),
+      map_row("map campus_twice", "streets driven twice", across("campus_twice")),
+      map_row("map long_drive", "three outages, streets driven twice", across("long_drive")),
+      map_row("map second_run", "second run from a stored session", map_of_second_run),
+      map_row("map merged", "two sessions merged", map_of_merged_sessions),
+      map_row("map street_traffic", "walkers and cars", map_without_traffic),
   };
   return all;
 }

@@ -36,12 +36,16 @@ struct Figure {
 
 using Figures = std::vector<Figure>;
 
+struct MapTask;
+
 struct Row {
   std::string scenario;  ///< with its changes
   std::string what;      ///< the table's words
   std::function<Figures(const Drive&, const std::string& mode)> score;
   bool sorted{false};      ///< also with sorted fixes
   bool many_short{false};  ///< over many seeds (--short-runs)
+  /// Instead of `score`: of the map and the corrected past, from drives of its own.
+  std::function<Figures(const MapTask&)> score_map{};
 };
 
 const std::vector<Row>& rows();

@@ -2,12 +2,15 @@
 // Copyright the Trigpoint developers
 // What the fusion gate must show, as one table: simulated drives with faults of the GPS, every mode
 // on the same input, over several seeds. The truth is used for scoring only.
+#include "fusion_map.hpp"
 #include "fusion_scoreboard.hpp"
 #include <CLI/CLI.hpp>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
+#include <filesystem>
 #include <future>
 #include <iterator>
 #include <set>
@@ -28,6 +31,8 @@ struct Options {
   std::uint64_t jobs{1};
   std::string csv;
   bool only_faults{false};
+  bool map_rows{false};
+  std::string scratch{std::filesystem::temp_directory_path().string()};
   cli::InputOptions input;
 };
 
@@ -35,7 +40,8 @@ std::vector<Row> chosen(const Options& options) {
   std::vector<Row> result;
   for (const Row& row : rows()) {
     const auto& wanted = options.scenarios;
-    if (wanted.empty() || std::find(wanted.begin(), wanted.end(), row.scenario) != wanted.end()) {
+    if ((wanted.empty() && (!options.map_rows || row.score_map)) ||
+        std::find(wanted.begin(), wanted.end(), row.scenario) != wanted.end()) {
       result.push_back(row);
     }
   }
@@ -76,6 +82,28 @@ void tell(const Drive& result) {
     std::fprintf(stderr, " %s %.0f s", mode.c_str(), run.process_s);
   }
   std::fprintf(stderr, "\n");
+}
+
+/// Drives into a folder of its own, which goes when it is scored.
+void run_map_row(const Row& row, const Options& options, Scoreboard& scores) {
+  namespace fs = std::filesystem;
+  for (std::uint64_t i = 0; i < options.seeds; ++i) {
+    for (const std::string& mode : options.modes) {
+      const fs::path folder =
+          fs::path(options.scratch) / ("fusion_table_" + std::to_string(getpid()));
+      fs::remove_all(folder);
+      fs::create_directories(folder);
+      MapTask task{options.input, mode, folder.string()};
+      task.input.seed = options.first_seed + i;
+      scores.add(row, mode, *task.input.seed, row.score_map(task));
+      fs::remove_all(folder);
+      std::fprintf(stderr,
+                   "%s, seed %llu, %s done\n",
+                   row.scenario.c_str(),
+                   static_cast<unsigned long long>(*task.input.seed),
+                   mode.c_str());
+    }
+  }
 }
 
 /// All seeds of one scenario.
@@ -141,6 +169,9 @@ void print_faults(const std::vector<std::string>& scenarios, const Options& opti
       "| scenario | seed | what | from s | for s | m driven | largest fault m |\n"
       "|---|---|---|---|---|---|---|\n");
   for (const std::string& scenario : scenarios) {
+    if (rows_of(rows(), scenario).front().score_map) {
+      continue;
+    }
     for (std::uint64_t i = 0; i < options.seeds; ++i) {
       cli::InputOptions input = options.input;
       input.log = scenario;
@@ -172,7 +203,11 @@ void run(const Options& options) {
   print(scores.head());
   for (const std::string& scenario : scenarios_of(all)) {
     const auto its_rows = rows_of(all, scenario);
-    run_scenario(scenario, its_rows, options, scores);
+    if (its_rows.front().score_map) {
+      run_map_row(its_rows.front(), options, scores);
+    } else {
+      run_scenario(scenario, its_rows, options, scores);
+    }
     for (const Row& row : its_rows) {
       print(scores.print(row));
     }
@@ -211,6 +246,9 @@ int main(int argc, char** argv) {
       ->check(CLI::PositiveNumber);
   app.add_option("--config", options.input.config_files, "overlays of the configuration");
   app.add_option("--csv", options.csv, "every single figure");
+  app.add_flag("--map-rows", options.map_rows, "only the rows of the map and the corrected past");
+  app.add_option("--scratch", options.scratch, "where the sessions of those rows are made")
+      ->check(CLI::ExistingDirectory);
   app.add_flag("--faults", options.only_faults, "print the scenarios' faults and do not drive");
   CLI11_PARSE(app, argc, argv);
   try {

@@ -106,6 +106,24 @@ FixVerdict from_message(const trigpoint_msgs::msg::FixVerdict& message) {
   return {bus::from_message(message.fix_stamp()), message.used(), message.reason()};
 }
 
+trigpoint_msgs::msg::FixRecord to_message(const FixRecord& record) {
+  trigpoint_msgs::msg::FixRecord message;
+  message.stamp(bus::to_message(record.stamp_ns));
+  message.accepted(record.accepted);
+  message.reason(record.reason);
+  message.antenna_map_m(array_of(record.antenna_map_m));
+  message.covariance_map_m2(row_major(record.covariance_map_m2));
+  return message;
+}
+
+FixRecord from_message(const trigpoint_msgs::msg::FixRecord& message) {
+  return {bus::from_message(message.stamp()),
+          message.accepted(),
+          message.reason(),
+          vector_of(message.antenna_map_m()),
+          from_row_major<3>(message.covariance_map_m2())};
+}
+
 }  // namespace
 
 trigpoint_msgs::msg::GpsStatus to_message(const GpsStatus& status) {
@@ -124,6 +142,9 @@ trigpoint_msgs::msg::GpsStatus to_message(const GpsStatus& status) {
   message.rejections(to_message(status.rejections));
   message.imu_received(status.imu_received);
   message.reset(to_message(status.reset));
+  for (const FixRecord& record : status.recent_fixes) {
+    message.recent_fixes().push_back(to_message(record));
+  }
   return message;
 }
 
@@ -143,6 +164,9 @@ GpsStatus from_message(const trigpoint_msgs::msg::GpsStatus& message) {
   status.rejections = from_message(message.rejections());
   status.imu_received = message.imu_received();
   status.reset = from_message(message.reset());
+  for (const auto& record : message.recent_fixes()) {
+    status.recent_fixes.push_back(from_message(record));
+  }
   return status;
 }
 
@@ -242,6 +266,9 @@ trigpoint_msgs::msg::FusionStatus to_message(const FusionStatus& status) {
   message.fixes_used(status.fixes_used);
   message.verdicts(to_message(status.verdicts));
   message.gps_source(status.gps_source);
+  for (const FixVerdict& verdict : status.judged) {
+    message.judged().push_back(to_message(verdict));
+  }
   return message;
 }
 
@@ -261,6 +288,9 @@ FusionStatus from_message(const trigpoint_msgs::msg::FusionStatus& message) {
   status.fixes_used = message.fixes_used();
   status.verdicts = from_message(message.verdicts());
   status.gps_source = message.gps_source();
+  for (const auto& verdict : message.judged()) {
+    status.judged.push_back(from_message(verdict));
+  }
   return status;
 }
 

@@ -215,17 +215,27 @@ bool is_facade(const Plane& plane, const Points& inliers, const Points& window) 
          extent_m(inliers, Vector3d::UnitZ()) >= kLeastHeight_m;
 }
 
-/// The wall's thickness; nullopt when the cell holds none, or holds it only as a neighbour's.
-std::optional<double> thickness_in(const CellKey& key, const Points& points) {
+/// The wall of a cell; nullopt when it holds none.
+std::optional<Plane> facade_in(const Points& points) {
   const std::optional<Plane> plane = find_plane(points);
-  if (!plane || index_of(plane->centre_m.x(), kCell_m) != key[0] ||
-      index_of(plane->centre_m.y(), kCell_m) != key[1]) {
+  const bool is_wall =
+      plane &&
+      is_facade(*plane, near_to(*plane, points, kInlier_m), near_to(*plane, points, kWindow_m));
+  return is_wall ? plane : std::nullopt;
+}
+
+/// Whether the cell holds it not only as a neighbour's.
+bool is_own(const Plane& plane, const CellKey& key) {
+  return index_of(plane.centre_m.x(), kCell_m) == key[0] &&
+         index_of(plane.centre_m.y(), kCell_m) == key[1];
+}
+
+std::optional<double> thickness_in(const CellKey& key, const Points& points) {
+  const std::optional<Plane> plane = facade_in(points);
+  if (!plane || !is_own(*plane, key)) {
     return std::nullopt;
   }
   const Points window = near_to(*plane, points, kWindow_m);
-  if (!is_facade(*plane, near_to(*plane, points, kInlier_m), window)) {
-    return std::nullopt;
-  }
   std::vector<double> distances_m;
   for (const Vector3d& p : window) {
     distances_m.push_back(plane->distance_m(p));
@@ -234,7 +244,47 @@ std::optional<double> thickness_in(const CellKey& key, const Points& points) {
   return 0.5 * (at_rank(distances_m, kHighRank) - low);
 }
 
+/// From the first cloud's wall to the second's, along its normal.
+std::optional<double> offset_in(const CellKey& key, const Points& first, const Points& second) {
+  const std::optional<Plane> of_first = facade_in(first);
+  const std::optional<Plane> of_second = of_first ? facade_in(second) : std::nullopt;
+  if (!of_second || !is_own(*of_first, key) ||
+      std::abs(of_first->normal.dot(of_second->normal)) < std::cos(kMostTilt)) {
+    return std::nullopt;
+  }
+  std::vector<double> distances_m;
+  for (const Vector3d& p : near_to(*of_second, second, kInlier_m)) {
+    distances_m.push_back(of_first->distance_m(p));
+  }
+  const double offset_m = std::abs(at_rank(distances_m, 0.5));
+  return offset_m <= kWindow_m ? std::optional(offset_m) : std::nullopt;
+}
+
 }  // namespace
+
+FacadeOffset facade_offset(const PointCloud& first, const PointCloud& second) {
+  const auto of_first = fill_cells(first, 1.0);
+  const auto of_second = fill_cells(second, 1.0);
+  std::vector<double> offsets_m;
+  for (const auto& [key, points] : of_first) {
+    const auto same = of_second.find(key);
+    const Points standing = same == of_second.end() ? Points{} : upright(points);
+    const Points others = standing.size() < kLeastPoints ? Points{} : upright(same->second);
+    if (others.size() < kLeastPoints) {
+      continue;
+    }
+    if (const auto offset_m = offset_in(key, standing, others)) {
+      offsets_m.push_back(*offset_m);
+    }
+  }
+  FacadeOffset result;
+  result.planes = offsets_m.size();
+  if (result.planes > 0) {
+    result.median_m = at_rank(offsets_m, 0.5);
+    result.p90_m = at_rank(offsets_m, 0.9);
+  }
+  return result;
+}
 
 PlaneThickness facade_thickness(const PointCloud& cloud, const PlaneThicknessOptions& options) {
   PlaneThickness result;

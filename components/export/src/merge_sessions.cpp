@@ -72,17 +72,6 @@ void write_part(const std::string& file,
   }
 }
 
-/// The samples of the first session come first; those of epochs that were left out are missing.
-std::size_t samples_of_first(const std::vector<lio_mapper::MapSample>& samples,
-                             const GraphInput& first,
-                             const lio_mapper::CorrectedPast& past) {
-  lio_mapper::CorrectedPast of_first;
-  of_first.T_map_base.assign(
-      past.T_map_base.begin(),
-      past.T_map_base.begin() + static_cast<std::ptrdiff_t>(first.keyframes.size()));
-  return std::min(samples.size(), lio_mapper::corrected_trajectory(first, of_first).size());
-}
-
 }  // namespace
 
 MergeReport merge_sessions(const std::string& first,
@@ -92,9 +81,9 @@ MergeReport merge_sessions(const std::string& first,
                            const std::function<void(double)>& progress) {
   const Datum datum = datum_of(first);
   const Pose T_map_second = between(datum, datum_of(second));
-  const GraphInput of_first = graph_input_of(first);
-  const std::size_t begin_of_second = of_first.keyframes.size();
-  GraphInput input = of_first;
+  GraphInput input = graph_input_of(first);
+  const std::size_t begin_of_second = input.keyframes.size();
+  const std::size_t sweeps_of_first = input.trajectory.size();
   lio_mapper::merge_sessions(input, graph_input_of(second), T_map_second);
   KeyframeReader first_store(path_in(first, session_file::kKeyframes));
   KeyframeReader second_store(path_in(second, session_file::kKeyframes));
@@ -112,7 +101,11 @@ MergeReport merge_sessions(const std::string& first,
   create_session_folder(out);
   write_datum(path_in(out, session_file::kDatum), datum);
   const std::vector<lio_mapper::MapSample> samples = lio_mapper::corrected_trajectory(input, past);
-  const std::size_t split = samples_of_first(samples, of_first, past);
+  const auto second_begins =
+      std::find_if(samples.begin(), samples.end(), [&](const lio_mapper::MapSample& sample) {
+        return sample.sweep >= sweeps_of_first;
+      });
+  const auto split = static_cast<std::size_t>(second_begins - samples.begin());
   write_part(path_in(out, "first.tum"), samples, 0, split);
   write_part(path_in(out, "second.tum"), samples, split, samples.size());
   render_keyframes(

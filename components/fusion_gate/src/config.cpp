@@ -77,10 +77,15 @@ void describe(SmoothConfig& config, ConfigFields& fields) {
                 config.raw_sigma_scale,
                 "receivers are optimistic: sigma of a raw fix is multiplied by this",
                 kPositive);
+  fields.number("lio_drift_m_per_sqrt_m",
+                config.lio_drift_m_per_sqrt_m,
+                "what LIO may drift before a fix is doubted: sigma per axis is this times the "
+                "square root of the distance; more than the alignment counts with, so that a "
+                "LIO that drifts more than usual throws no good fix out",
+                kNotNegative);
   fields.number("lio_drift_share",
                 config.lio_drift_share,
-                "LIO's drift on long ways, where it is more than the random walk of "
-                "alignment.lio_drift_m_per_sqrt_m: one sigma, as a share of the distance",
+                "the same on long ways, where it is more: one sigma, as a share of the distance",
                 kNotNegative);
   fields.number("lio_yaw_drift_rad_per_sqrt_m",
                 config.lio_yaw_drift_rad_per_sqrt_m,
@@ -141,7 +146,8 @@ void describe(Config& config, ConfigFields& fields) {
   fields.number("max_inflation", config.max_inflation, "of that factor", {1.0, 1e6});
   fields.number("max_fix_age_s",
                 config.max_fix_age_s,
-                "a fix further behind LIO's newest stamp makes no row",
+                "a fix further behind LIO's newest stamp makes no row; so long a fix that came "
+                "out of order is waited for (below the mapper's rows.history_s)",
                 kPositive);
   fields.number("source_timeout_s",
                 config.source_timeout_s,

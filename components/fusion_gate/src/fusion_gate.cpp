@@ -24,6 +24,7 @@ FusionGate::Impl::Impl(const Config& config_in, const RobotConfig& robot_in)
       rows(config_in, robot_in.antenna_position_base_m),
       lio_poses(kLioBuffer_ns, from_seconds(config_in.alignment.max_interpolation_gap_s)),
       window(config_in.alignment),
+      queue(config_in.max_fix_age_s),
       monitor(config_in, robot_in.antenna_position_base_m),
       placements(config_in),
       hand_over(config_in.smooth.hand_over_mps, config_in.smooth.hand_over_radps) {}
@@ -96,7 +97,6 @@ Output FusionGate::on_lio_odometry(const Odometry& odometry) {
   gate.advance(odometry.stamp_ns);
   gate.last_lio_ns = std::max(gate.last_lio_ns.value_or(odometry.stamp_ns), odometry.stamp_ns);
   gate.last_scan_covariance = odometry.pose_covariance;
-  gate.align_pending(out);
   const bool imu_rate_silent =
       !gate.last_imu_rate_ns ||
       to_seconds(gate.now_ns - *gate.last_imu_rate_ns) > gate.config.imu_rate_timeout_s;

@@ -9,6 +9,7 @@
 #include "alignment/placement_history.hpp"
 #include "alignment/pose_buffer.hpp"
 #include "checks/accepted_fix.hpp"
+#include "checks/fix_queue.hpp"
 #include "checks/foreign_source.hpp"
 #include "checks/gps_sources.hpp"
 #include "checks/verdicts.hpp"
@@ -36,16 +37,26 @@ struct FusionGate::Impl {
   void take_gps_odometry(const Odometry& odometry, const std::string& writer, Output& out);
   void take_gps_status(const GpsStatus& status, const std::string& writer, Output& out);
   void take_raw_fix(const GnssFix& fix, Output& out);
+
+  struct Told {
+    std::uint64_t fixes{0};                        // of which nobody had told yet
+    std::map<std::string, std::uint64_t> refused;  // of them, by reason
+  };
+
+  Told take_records(const GpsStatus& status, const std::optional<GpsStatus>& last, Output& out);
   void settle_others(const GpsStatus& status,
                      const std::optional<GpsStatus>& last,
-                     bool told_of_a_fix);
-  void judge(const AcceptedFix& fix, const std::optional<Refusal>& refusal, Output& out);
-  void accept(const AcceptedFix& fix, Output& out);
+                     const Told& told);
+  std::uint64_t open_fixes(const GpsStatus& status, const std::optional<GpsStatus>& last) const;
+  bool tell_of(ToldFix told, Output& out);
+  void note_accepted(const AcceptedFix& fix);
   void follow_healthiest(Output& out);
   ForeignSource& foreign(const std::string& writer);
 
   // --- alignment and rows
-  void align_pending(Output& out);
+  void judge_waiting(Output& out);
+  bool is_mapper_awaited(Output& out);
+  void judge(const AcceptedFix& fix, const PoseBuffer::Answer& lio_pose, Output& out);
   void add_pair(const AcceptedFix& fix, const PoseBuffer::Sample& at_fix, Output& out);
   void make_rows(const AcceptedFix& fix, Output& out);
   void send_rows(const AcceptedFix& fix, const AxisChoices& choices, Output& out);
@@ -57,7 +68,7 @@ struct FusionGate::Impl {
   void go_back(const MonitorOutcome& outcome, const Witness& witness, Output& out);
   void replace(const Witness& witness, const Alignment& alignment, Output& out);
   bool is_replacement_awaited(Output& out);
-  AxisChoices choose_smoothly() const;
+  AxisChoices choose_smoothly(const Eigen::Vector3d& reported_m2) const;
   AxisChoice choose_trusted(int axis, double variance_m2) const;
   void tell_changes(const MonitorOutcome& outcome, Output& out) const;
   std::optional<Alignment> best_alignment() const;
@@ -73,6 +84,7 @@ struct FusionGate::Impl {
   bool gps_carries() const;
   std::optional<Odometry> gps_in_map() const;
   Eigen::Vector3d gps_variance_m2() const;
+  Eigen::Vector3d variance_of(const AcceptedFix& fix) const;
   void publish_lio(const Odometry& odometry, Output& out);
   void publish_gps(Output& out);
   void publish(const Odometry& odometry, const Pose& unchanged, Output& out);
@@ -103,7 +115,8 @@ struct FusionGate::Impl {
   RowMaker rows;
   PoseBuffer lio_poses;
   AlignmentWindow window;
-  std::deque<AcceptedFix> pending;  // accepted, waiting for LIO to cover their stamps
+  FixQueue queue;  // told of, waiting for earlier fixes and for LIO to cover their stamps
+  std::optional<Nanoseconds> alignment_sent_ns;  // and the mapper has not said that it has it
   std::map<std::string, ForeignSource> foreign_sources;
   std::optional<geodesy::LocalFrame> frame;
   std::optional<LioStatus> lio;

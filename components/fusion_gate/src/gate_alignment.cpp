@@ -11,25 +11,52 @@ namespace trigpoint::fusion_gate {
 namespace {
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
+constexpr double kRepeatAlignment_s = 0.5;  // a mapper has it with its next scan
 
 }  // namespace
 
-void FusionGate::Impl::align_pending(Output& out) {
-  while (!pending.empty()) {
-    const AcceptedFix fix = pending.front();
-    const PoseBuffer::Answer answer = lio_poses.at(fix.stamp_ns);
-    if (answer.coverage == PoseBuffer::Coverage::kNotYet) {
+void FusionGate::Impl::judge_waiting(Output& out) {
+  while (!is_mapper_awaited(out)) {
+    const ToldFix* next = queue.next(now_ns);
+    if (next == nullptr) {
       return;
     }
-    pending.pop_front();
-    verdict_changed = true;
-    if (answer.coverage != PoseBuffer::Coverage::kCovered) {
-      verdicts.record(fix.stamp_ns, false, "no_lio_pose", "no LIO pose at the fix's stamp");
-    } else if (aligned()) {
-      judge_values(fix, answer.sample, out);
-    } else {
-      add_pair(fix, answer.sample, out);
+    const PoseBuffer::Answer lio_pose = lio_poses.at(next->fix.stamp_ns);
+    const auto refusal = next->refusal();
+    if (!refusal && lio_pose.coverage == PoseBuffer::Coverage::kNotYet) {
+      return;
     }
+    const ToldFix told = queue.take();
+    verdict_changed = true;
+    if (refusal) {
+      verdicts.record(told.fix.stamp_ns, false, refusal->code, refusal->reason);
+      tell(out, Severity::kWarning, "fix_refused", refusal->reason);
+    } else {
+      judge(told.fix, lio_pose, out);
+    }
+  }
+}
+
+/// An alignment is on its way: what comes next is to be held against it.
+bool FusionGate::Impl::is_mapper_awaited(Output& out) {
+  if (aligned()) {
+    alignment_sent_ns.reset();
+    return is_replacement_awaited(out);
+  }
+  return alignment_sent_ns && to_seconds(now_ns - *alignment_sent_ns) < kRepeatAlignment_s;
+}
+
+void FusionGate::Impl::judge(const AcceptedFix& fix,
+                             const PoseBuffer::Answer& lio_pose,
+                             Output& out) {
+  if (lio_pose.coverage != PoseBuffer::Coverage::kCovered) {
+    verdicts.record(fix.stamp_ns, false, "no_lio_pose", "no LIO pose at the fix's stamp");
+  } else if (!aligned()) {
+    add_pair(fix, lio_pose.sample, out);
+  } else if (mode == Mode::kSmooth) {
+    judge_values(fix, lio_pose.sample, out);
+  } else {
+    make_rows(fix, out);
   }
 }
 
@@ -54,6 +81,7 @@ void FusionGate::Impl::add_pair(const AcceptedFix& fix,
   const Alignment alignment{
       lio ? lio->odom_epoch : 0, window.solution()->T_map_odom, window.solution()->covariance};
   out.state_updates.push_back(rows.make_alignment(fix, alignment));
+  alignment_sent_ns = now_ns;
   monitor.on_alignment(witness_of(fix, at_fix));
   verdicts.record(fix.stamp_ns, true, "alignment", "carries the first alignment");
   if (!was_admitted) {
@@ -67,8 +95,7 @@ void FusionGate::Impl::add_pair(const AcceptedFix& fix,
 }
 
 void FusionGate::Impl::make_rows(const AcceptedFix& fix, Output& out) {
-  const AxisChoices choices = choose_axes(mode, gps_variance_m2(), threshold_m);
-  verdict_changed = true;
+  const AxisChoices choices = choose_axes(mode, variance_of(fix), threshold_m);
   if (mode == Mode::kLio) {
     verdicts.record(fix.stamp_ns, false, "mode_lio", "mode lio takes no GPS rows");
     return;
@@ -127,31 +154,21 @@ void FusionGate::Impl::take_lio_status(const LioStatus& next, Output& out) {
   if (aligned()) {
     placements.add(next, lio_poses.distance_m());
   }
-  if (aligned() && mode == Mode::kSmooth) {
-    if (!was_aligned) {
-      window.clear();
-    }
-    align_pending(out);
-    return;
-  }
-  if (aligned() && (!was_aligned || !pending.empty())) {
+  if (aligned() && !was_aligned) {
     window.clear();
-    const std::deque<AcceptedFix> waiting = std::move(pending);
-    pending.clear();
-    for (const AcceptedFix& fix : waiting) {
-      make_rows(fix, out);
-    }
   }
 }
 
 void FusionGate::Impl::begin_epoch(const LioStatus& next, Output& out) {
   lio_poses.forget_before(next.stamp_ns);
   window.clear();
-  for (const AcceptedFix& fix : pending) {
-    verdicts.record(fix.stamp_ns, false, "odom_epoch", "LIO began another odom epoch meanwhile");
+  for (const ToldFix& told : queue.waiting()) {
+    const Nanoseconds stamp_ns = told.fix.stamp_ns;
+    verdicts.record(stamp_ns, false, "odom_epoch", "LIO began another odom epoch meanwhile");
+    verdict_changed = true;
   }
-  verdict_changed = verdict_changed || !pending.empty();
-  pending.clear();
+  queue.clear_waiting();
+  alignment_sent_ns.reset();
   monitor.begin_anew();
   placements.clear();
   awaited.reset();

@@ -11,7 +11,7 @@ namespace trigpoint::fusion_gate {
 
 namespace {
 
-constexpr std::size_t kMaxPendingFixes = 64;
+constexpr std::size_t kMaxWaitingFixes = 64;
 constexpr const char* kBeforeDatum = "before_datum";
 
 /// Fixes that were newly refused, by reason.
@@ -31,6 +31,31 @@ std::map<std::string, std::uint64_t> new_refusals(const GpsStatus& now, const Gp
 
 std::uint64_t growth(std::uint64_t now, std::uint64_t before) {
   return now > before ? now - before : 0;
+}
+
+std::string refused_code(const std::string& reason) {
+  return "refused_by_filter_" + reason;
+}
+
+std::string refused_sentence(const GpsStatus& gps, const std::string& reason) {
+  return "refused by " + gps.source + ": " + reason;
+}
+
+/// A filter that keeps no records tells of its newest accepted fix only.
+std::vector<ToldFix> told_fixes(const GpsStatus& gps) {
+  std::vector<ToldFix> told;
+  for (const FixRecord& record : gps.recent_fixes) {
+    const AcceptedFix fix{record.stamp_ns, record.antenna_map_m, record.covariance_map_m2, true};
+    const Refusal refusal{refused_code(record.reason), refused_sentence(gps, record.reason)};
+    told.push_back({fix, record.accepted ? std::nullopt : std::optional(refusal), std::nullopt});
+  }
+  if (told.empty() && gps.last_accepted_fix_ns != 0) {
+    told.push_back(
+        {{gps.last_accepted_fix_ns, gps.accepted_antenna_map_m, gps.accepted_covariance_map_m2},
+         std::nullopt,
+         std::nullopt});
+  }
+  return told;
 }
 
 }  // namespace
@@ -54,7 +79,7 @@ void FusionGate::Impl::take_gps_odometry(const Odometry& odometry,
   }
   out.selected = gps_in_map();
   for (const AcceptedFix& fix : ready) {
-    judge(fix, std::nullopt, out);
+    tell_of({fix, std::nullopt, std::nullopt}, out);
   }
   publish_gps(out);
 }
@@ -71,43 +96,68 @@ void FusionGate::Impl::take_gps_status(const GpsStatus& gps,
   if (writer != sources.followed()) {
     return;
   }
-  const bool told_of_a_fix = gps.last_accepted_fix_ns != 0 &&
-                             (!before || gps.last_accepted_fix_ns != before->last_accepted_fix_ns);
-  settle_others(gps, before, told_of_a_fix);
-  if (told_of_a_fix) {
-    judge({gps.last_accepted_fix_ns, gps.accepted_antenna_map_m, gps.accepted_covariance_map_m2},
-          check_status(gps, datum_id()),
-          out);
-  }
+  settle_others(gps, before, take_records(gps, before, out));
 }
 
-/// A status speaks of the newest accepted fix only. The others that the filter has received since
-/// its last one get their verdict here, so that every fix has exactly one: refused ones by reason,
-/// and accepted ones that came behind a newer fix (late ones overtake each other).
-void FusionGate::Impl::settle_others(const GpsStatus& gps,
-                                     const std::optional<GpsStatus>& last,
-                                     bool told_of_a_fix) {
-  const bool began_anew = last && gps.fixes_received < last->fixes_received;
-  const GpsStatus before = last && !began_anew ? *last : GpsStatus{};
-  std::uint64_t open = growth(gps.fixes_received, before.fixes_received);
+/// Fixes that the filter has received since its last status and that this gate has seen come.
+std::uint64_t FusionGate::Impl::open_fixes(const GpsStatus& gps,
+                                           const std::optional<GpsStatus>& last) const {
   if (!last) {
     // What the filter had received before this gate began is nobody's business here.
-    open = std::min(open, growth(fixes_seen, verdicts.total()));
+    return std::min(gps.fixes_received, growth(fixes_seen, verdicts.total()));
   }
+  const bool began_anew = gps.fixes_received < last->fixes_received;
+  return growth(gps.fixes_received, began_anew ? 0 : last->fixes_received);
+}
+
+FusionGate::Impl::Told FusionGate::Impl::take_records(const GpsStatus& gps,
+                                                      const std::optional<GpsStatus>& last,
+                                                      Output& out) {
+  std::vector<ToldFix> all = told_fixes(gps);
+  const std::size_t wanted = std::max<std::size_t>(1, open_fixes(gps, last));
+  if (!last && all.size() > wanted) {
+    all.erase(all.begin(), all.end() - static_cast<std::ptrdiff_t>(wanted));
+  }
+  const bool repeats =
+      gps.recent_fixes.empty() && last && gps.last_accepted_fix_ns == last->last_accepted_fix_ns;
+  Told told;
+  for (ToldFix& one : repeats ? std::vector<ToldFix>{} : all) {
+    one.fault = one.refused_by_filter ? std::nullopt : check_status(gps, datum_id());
+    if (tell_of(one, out)) {
+      ++told.fixes;
+      if (one.refused_by_filter) {
+        ++told.refused[one.refused_by_filter->code];
+      }
+    }
+  }
+  return told;
+}
+
+/// Fixes without a record get their verdict here, so that every fix has exactly one: messages that
+/// the filter refused as such, by reason; and of a filter that keeps no records all that it
+/// refused, and what it accepted behind a newer fix.
+void FusionGate::Impl::settle_others(const GpsStatus& gps,
+                                     const std::optional<GpsStatus>& last,
+                                     const Told& told) {
+  const bool began_anew = last && gps.fixes_received < last->fixes_received;
+  const GpsStatus before = last && !began_anew ? *last : GpsStatus{};
+  std::uint64_t open = open_fixes(gps, last);
   const auto settle = [&](std::uint64_t count, const std::string& code, const std::string& why) {
     for (; count > 0 && open > 0; --count, --open) {
       verdicts.record(gps.stamp_ns, false, code, why);
       verdict_changed = true;
     }
   };
-  for (const auto& [reason, count] : new_refusals(gps, before)) {
-    settle(count, "refused_by_filter_" + reason, "refused by " + gps.source + ": " + reason);
-  }
-  if (told_of_a_fix && open > 0) {
-    --open;  // gets its own verdict
-  } else if (told_of_a_fix && verdicts.is_known(kBeforeDatum) &&
-             !verdicts.is_judged(gps.last_accepted_fix_ns)) {
+  const std::uint64_t of_now = std::min(open, told.fixes);
+  open -= of_now;
+  for (std::uint64_t k = of_now; before.datum_id.empty() && k < told.fixes; ++k) {
     verdicts.take_back(kBeforeDatum);  // told of again, now that it has a place in map
+  }
+  for (const auto& [reason, count] : new_refusals(gps, before)) {
+    const auto recorded = told.refused.find(refused_code(reason));
+    settle(growth(count, recorded == told.refused.end() ? 0 : recorded->second),
+           refused_code(reason),
+           refused_sentence(gps, reason));
   }
   const std::uint64_t accepted = growth(gps.fixes_accepted, before.fixes_accepted);
   if (gps.datum_id.empty()) {
@@ -123,6 +173,7 @@ void FusionGate::Impl::settle_others(const GpsStatus& gps,
 void FusionGate::Impl::take_raw_fix(const GnssFix& fix, Output& out) {
   ++fixes_seen;
   verdict_changed = true;
+  queue.hear(fix.stamp_ns, now_ns);
   follow_healthiest(out);
   const geodesy::Geographic place{
       fix.latitude_deg, fix.longitude_deg, fix.altitude_m + robot.geoid_undulation_m};
@@ -159,7 +210,7 @@ void FusionGate::Impl::take_raw_fix(const GnssFix& fix, Output& out) {
         source.on_fix({fix.stamp_ns, *position, floored(covariance_m2, config.min_sigma_m)});
     if (writer == sources.followed()) {
       for (const AcceptedFix& accepted : ready) {
-        judge(accepted, std::nullopt, out);
+        tell_of({accepted, std::nullopt, std::nullopt}, out);
       }
     }
   }
@@ -169,25 +220,45 @@ ForeignSource& FusionGate::Impl::foreign(const std::string& writer) {
   return foreign_sources.try_emplace(writer, config, robot.antenna_position_base_m).first->second;
 }
 
-void FusionGate::Impl::judge(const AcceptedFix& fix,
-                             const std::optional<Refusal>& refusal,
-                             Output& out) {
-  if (!verdicts.is_new(fix.stamp_ns)) {
-    return;
+/// True when nobody had told of the fix yet. What is held of one that waits is brought up to date.
+bool FusionGate::Impl::tell_of(ToldFix told, Output& out) {
+  const Nanoseconds stamp_ns = told.fix.stamp_ns;
+  if (const ToldFix* known = queue.find(stamp_ns)) {
+    told.fault = known->fault;
+    queue.put(told);
+    return false;
   }
-  std::optional<Refusal> fault = refusal;
-  fault = fault ? fault : check_values(fix);
-  fault = fault ? fault : check_age(fix, last_lio_ns, config.max_fix_age_s);
-  verdict_changed = true;
-  if (fault) {
-    verdicts.record(fix.stamp_ns, false, fault->code, fault->reason);
-    tell(out, Severity::kWarning, "fix_refused", fault->reason);
-    return;
+  if (!verdicts.is_new(stamp_ns)) {
+    return false;
   }
-  accept(fix, out);
+  if (!told.refused_by_filter && !told.fault) {
+    told.fault = check_values(told.fix);
+  }
+  std::optional<Refusal> late;
+  if (!told.refusal()) {
+    late = check_age(told.fix, last_lio_ns, config.max_fix_age_s);
+    if (!late && mode == Mode::kSmooth && queue.is_overtaken(stamp_ns)) {
+      late = Refusal{"behind_newer_fix", "a newer fix was judged already"};
+    }
+  }
+  if (late) {
+    verdict_changed = true;
+    verdicts.record(stamp_ns, false, late->code, late->reason);
+    tell(out, Severity::kWarning, "fix_refused", late->reason);
+    return true;
+  }
+  if (!told.refusal()) {
+    note_accepted(told.fix);
+  }
+  queue.put(told);
+  if (queue.waiting().size() > kMaxWaitingFixes) {
+    verdicts.record(
+        queue.take().fix.stamp_ns, false, "no_lio_pose", "LIO never covered the fix's stamp");
+  }
+  return true;
 }
 
-void FusionGate::Impl::accept(const AcceptedFix& fix, Output& out) {
+void FusionGate::Impl::note_accepted(const AcceptedFix& fix) {
   constexpr std::size_t kIntervals = 5;
   if (last_accepted_ns && fix.stamp_ns > *last_accepted_ns) {
     fix_intervals_s.push_back(to_seconds(fix.stamp_ns - *last_accepted_ns));
@@ -196,21 +267,6 @@ void FusionGate::Impl::accept(const AcceptedFix& fix, Output& out) {
     fix_intervals_s.pop_front();
   }
   last_accepted_ns = std::max(last_accepted_ns.value_or(fix.stamp_ns), fix.stamp_ns);
-  if (aligned() && mode != Mode::kSmooth) {
-    make_rows(fix, out);
-    return;
-  }
-  const auto later = std::upper_bound(
-      pending.begin(), pending.end(), fix, [](const AcceptedFix& a, const AcceptedFix& b) {
-        return a.stamp_ns < b.stamp_ns;
-      });
-  pending.insert(later, fix);
-  if (pending.size() > kMaxPendingFixes) {
-    verdicts.record(
-        pending.front().stamp_ns, false, "no_lio_pose", "LIO never covered the fix's stamp");
-    pending.pop_front();
-  }
-  align_pending(out);
 }
 
 void FusionGate::Impl::follow_healthiest(Output& out) {

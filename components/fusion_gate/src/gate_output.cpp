@@ -59,6 +59,11 @@ Eigen::Vector3d FusionGate::Impl::gps_variance_m2() const {
   return gps->pose_covariance.diagonal().head<3>();
 }
 
+/// Of the GPS odometry at the fix's stamp where the filter keeps a record of it.
+Eigen::Vector3d FusionGate::Impl::variance_of(const AcceptedFix& fix) const {
+  return fix.is_recorded ? Eigen::Vector3d(fix.covariance_map_m2.diagonal()) : gps_variance_m2();
+}
+
 /// The drift that lio/odometry adds to its covariance is what T_map_odom's covariance is about: in
 /// map it must not count twice. lio/status tells sigma in the local map, and the odometry by how
 /// much it grew since that scan.
@@ -187,7 +192,7 @@ FusionStatus FusionGate::Impl::status() const {
   result.stamp_ns = now_ns;
   result.mode = config.mode;
   const AxisChoices choices = aligned() && mode == Mode::kSmooth
-                                  ? choose_smoothly()
+                                  ? choose_smoothly(gps_variance_m2())
                                   : choose_axes(mode, gps_variance_m2(), threshold_m);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     result.axes[axis] = axis_status(axis, choices[axis]);
@@ -215,6 +220,7 @@ FusionStatus FusionGate::Impl::status() const {
 
 void FusionGate::Impl::finish(Output& out, bool status_wanted) {
   follow_healthiest(out);
+  judge_waiting(out);
   if (now_ns == 0) {
     return;  // no data time yet: raw fixes alone do not set it
   }
@@ -222,6 +228,7 @@ void FusionGate::Impl::finish(Output& out, bool status_wanted) {
       !last_status_ns || to_seconds(now_ns - *last_status_ns) >= config.status_period_s;
   if (status_wanted || verdict_changed || due) {
     out.status = status();
+    out.status->judged = verdicts.take_new();
     last_status_ns = now_ns;
     verdict_changed = false;
   }

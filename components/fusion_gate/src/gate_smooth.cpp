@@ -16,6 +16,18 @@ constexpr std::size_t kRawFixesKept = 64;
 constexpr double kReplacementTimeout_s = 1.0;
 constexpr double kWorthGoingBack_m = 0.01;
 
+/// A fix's covariance with the variances that were measured. Less than was said only as far as
+/// filters say too much on purpose: what is slow in the error does not scatter.
+Eigen::Matrix3d as_measured(const Eigen::Matrix3d& said_m2, const Eigen::Vector3d& scatter_m2) {
+  Eigen::Vector3d scale = Eigen::Vector3d::Ones();
+  for (int axis = 0; axis < 3; ++axis) {
+    if (std::isfinite(scatter_m2[axis])) {
+      scale[axis] = std::sqrt(std::max(kFilterMargin, scatter_m2[axis] / said_m2(axis, axis)));
+    }
+  }
+  return scale.asDiagonal() * said_m2 * scale.asDiagonal();
+}
+
 Part part_of(int axis) {
   return axis < 2 ? Part::kLevel : Part::kHeight;
 }
@@ -40,11 +52,6 @@ Witness FusionGate::Impl::witness_of(const AcceptedFix& fix,
 void FusionGate::Impl::judge_values(const AcceptedFix& fix,
                                     const PoseBuffer::Sample& at_fix,
                                     Output& out) {
-  verdict_changed = true;
-  if (is_replacement_awaited(out)) {
-    verdicts.record(fix.stamp_ns, false, "alignment", "waiting for the mapper to take T_map_odom");
-    return;
-  }
   const Witness witness = witness_of(fix, at_fix);
   const MonitorOutcome outcome = monitor.judge(witness, *lio);
   tell_changes(outcome, out);
@@ -64,14 +71,13 @@ void FusionGate::Impl::judge_values(const AcceptedFix& fix,
     return;
   }
   go_back(outcome, witness, out);
-  const AxisChoices choices = choose_smoothly();
+  const AxisChoices choices = choose_smoothly(variance_of(fix));
   for (std::size_t axis = 0; axis < 3; ++axis) {
     sigma_passes[axis] = choices[axis].sigma_m <= choices[axis].threshold_m;
   }
   if (any_fused(choices) || outcome.trusted[0]) {
     AcceptedFix weighted = fix;
-    weighted.covariance_map_m2.diagonal() +=
-        (monitor.scatter_map_m2(*lio) - fix.covariance_map_m2.diagonal()).cwiseMax(0.0);
+    weighted.covariance_map_m2 = as_measured(fix.covariance_map_m2, monitor.scatter_map_m2(*lio));
     send_rows(weighted, choices, out);
     return;
   }
@@ -136,9 +142,7 @@ bool FusionGate::Impl::is_replacement_awaited(Output& out) {
   return false;
 }
 
-/// As of now: sigmas grow between fixes.
-AxisChoices FusionGate::Impl::choose_smoothly() const {
-  const Eigen::Vector3d reported_m2 = gps_variance_m2();
+AxisChoices FusionGate::Impl::choose_smoothly(const Eigen::Vector3d& reported_m2) const {
   const Eigen::Vector3d scatter_m2 = monitor.scatter_map_m2(*lio);
   const Trust& level = monitor.trust(Part::kLevel);
   AxisChoices choices;

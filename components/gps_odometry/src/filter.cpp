@@ -34,6 +34,8 @@ class BufferedFilter : public Filter {
 
   bool has_fix_at(Nanoseconds stamp_ns) const override { return buffer_.has_fix_at(stamp_ns); }
 
+  std::vector<FixRecord> recent_fixes() const override { return buffer_.fixes(); }
+
   std::optional<Nanoseconds> newest_imu_ns() const override { return buffer_.newest_imu_ns(); }
 
   bool bridges_gap_until(Nanoseconds stamp_ns) const override {

@@ -13,6 +13,7 @@
 
 #include <memory>
 #include <optional>
+#include <vector>
 
 namespace trigpoint::gps_odometry {
 
@@ -30,6 +31,8 @@ class Filter {
   virtual FixOutcome insert(const CheckedYaw& yaw) = 0;
   virtual bool is_too_old(Nanoseconds stamp_ns) const = 0;
   virtual bool has_fix_at(Nanoseconds stamp_ns) const = 0;
+  /// What is held of the fixes that a late one can still change, by stamp.
+  virtual std::vector<FixRecord> recent_fixes() const = 0;
   virtual std::optional<Nanoseconds> newest_imu_ns() const = 0;
 
   /// An IMU that was silent until this stamp goes on without a new start.

@@ -399,6 +399,7 @@ GpsStatus GpsOdometry::Impl::status() const {
     status.last_accepted_fix_ns = track.accepted_ns;
     status.accepted_antenna_map_m = track.accepted_antenna_map_m;
     status.accepted_covariance_map_m2 = track.accepted_covariance_map_m2;
+    status.recent_fixes = filter->recent_fixes();
   }
   status.test_ratio = track.test_ratio;
   status.fixes_received = fixes_received;

@@ -14,6 +14,7 @@
 #include <iterator>
 #include <optional>
 #include <variant>
+#include <vector>
 
 namespace trigpoint::gps_odometry {
 
@@ -36,6 +37,9 @@ class RewindBuffer {
 
   bool is_too_old(Nanoseconds stamp_ns) const;
   bool has_fix_at(Nanoseconds stamp_ns) const;
+
+  /// What is held of every fix in the buffer: that of sorted input once all have come.
+  std::vector<FixRecord> fixes() const;
 
   /// The newest state.
   const State& newest() const { return entries_.empty() ? before_ : entries_.back().after; }
@@ -62,6 +66,7 @@ class RewindBuffer {
     Nanoseconds stamp_ns{0};
     Measurement measurement;
     State after;
+    FixOutcome outcome;  ///< of a fix
   };
 
   FixOutcome insert(Nanoseconds stamp_ns, const Measurement& measurement);
@@ -120,7 +125,7 @@ FixOutcome RewindBuffer<TrackerType>::insert(Nanoseconds stamp_ns, const Measure
   while (place != entries_.begin() && !is_before(*std::prev(place))) {
     --place;
   }
-  place = entries_.insert(place, Entry{stamp_ns, measurement, State{}});
+  place = entries_.insert(place, Entry{stamp_ns, measurement, State{}, {}});
   const auto before = [&](auto it) -> const State& {
     return it == entries_.begin() ? before_ : std::prev(it)->after;
   };
@@ -154,6 +159,7 @@ FixOutcome RewindBuffer<TrackerType>::apply(Entry& entry, const State& before) {
   } else {
     watch(entry, before);
   }
+  entry.outcome = outcome;
   return outcome;
 }
 
@@ -202,6 +208,17 @@ bool RewindBuffer<TrackerType>::has_fix_at(Nanoseconds stamp_ns) const {
   return std::any_of(entries_.begin(), entries_.end(), [&](const Entry& entry) {
     return entry.stamp_ns == stamp_ns && std::holds_alternative<MapFix>(entry.measurement);
   });
+}
+
+template <typename TrackerType>
+std::vector<FixRecord> RewindBuffer<TrackerType>::fixes() const {
+  std::vector<FixRecord> records;
+  for (const Entry& entry : entries_) {
+    if (std::holds_alternative<MapFix>(entry.measurement)) {
+      records.push_back(record_of(entry.stamp_ns, entry.outcome, entry.after));
+    }
+  }
+  return records;
 }
 
 template <typename TrackerType>

@@ -151,6 +151,10 @@ bool StrictFilter::has_fix_at(Nanoseconds stamp_ns) const {
   return is_running() ? stamp_ns == track_.accepted_ns : start_->has_fix_at(stamp_ns);
 }
 
+std::vector<FixRecord> StrictFilter::recent_fixes() const {
+  return is_running() ? std::vector<FixRecord>{} : start_->fixes();
+}
+
 std::optional<Nanoseconds> StrictFilter::newest_imu_ns() const {
   return imu_ns_;
 }

@@ -33,6 +33,8 @@ class StrictFilter : public Filter {
   bool is_too_old(Nanoseconds stamp_ns) const override;
 
   bool has_fix_at(Nanoseconds stamp_ns) const override;
+  /// None once it runs: the published filter does not go back.
+  std::vector<FixRecord> recent_fixes() const override;
 
   std::optional<Nanoseconds> newest_imu_ns() const override;
 

@@ -24,6 +24,18 @@ bool agrees(const RefusedStreak& streak, const MapFix& fix, double highest_speed
 
 }  // namespace
 
+FixRecord record_of(Nanoseconds stamp_ns, const FixOutcome& outcome, const Track& after) {
+  FixRecord record;
+  record.stamp_ns = stamp_ns;
+  record.accepted = outcome.accepted;
+  record.reason = outcome.accepted ? "" : outcome.reason;
+  if (outcome.accepted) {
+    record.antenna_map_m = after.accepted_antenna_map_m;
+    record.covariance_map_m2 = after.accepted_covariance_map_m2;
+  }
+  return record;
+}
+
 void extend(RefusedStreak& streak, const MapFix& fix, double highest_speed_mps) {
   if (streak.count == 0 || !agrees(streak, fix, highest_speed_mps)) {
     streak = RefusedStreak{0, fix.checked.stamp_ns, 0, Vector3d::Zero()};

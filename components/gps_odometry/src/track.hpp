@@ -88,6 +88,9 @@ struct FixOutcome {
   std::string text;
 };
 
+/// What is told of a fix that left the Track so.
+FixRecord record_of(Nanoseconds stamp_ns, const FixOutcome& outcome, const Track& after);
+
 /// Adds a refused fix; one that does not agree with the streak begins another.
 void extend(RefusedStreak& streak, const MapFix& fix, double highest_speed_mps);
 

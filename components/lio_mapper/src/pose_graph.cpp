@@ -176,7 +176,7 @@ std::vector<MapSample> corrected_trajectory(const GraphInput& input, const Corre
       while (after < epoch.last && input.keyframes[after].stamp_ns <= sample.stamp_ns) {
         ++after;
       }
-      samples.push_back({sample.stamp_ns, carried_over(input, past, after, epoch, sample)});
+      samples.push_back({sample.stamp_ns, carried_over(input, past, after, epoch, sample), i});
     }
   }
   return samples;

@@ -115,6 +115,9 @@ inline GpsStatus gps_status() {
   status.rejections = {{"stale", 7}, {"no covariance", 8}};
   status.imu_received = 99;
   status.reset = {3, {0.03, {0.1, 0.2, 0.4}}};
+  status.recent_fixes = {
+      {10'800'000'003, false, "teleport", {4.0, 5.0, 6.0}, counting_matrix<3>(1.5)},
+      {10'900'000'002, true, "", {1.0, 2.0, 3.0}, counting_matrix<3>(0.5)}};
   return status;
 }
 
@@ -171,6 +174,7 @@ inline FusionStatus fusion_status() {
   status.fixes_used = 32;
   status.verdicts = {{"used", 32}, {"repeated", 1}, {"", 2}};
   status.gps_source = "0123456789abcdef";
+  status.judged = {{12'900'000'003, false, "off level"}, status.verdict};
   return status;
 }
 
@@ -286,6 +290,14 @@ inline void expect_equal(const GpsStatus& a, const GpsStatus& b) {
   expect_equal(a.rejections, b.rejections);
   EXPECT_EQ(a.imu_received, b.imu_received);
   expect_equal(a.reset, b.reset);
+  ASSERT_EQ(a.recent_fixes.size(), b.recent_fixes.size());
+  for (std::size_t i = 0; i < a.recent_fixes.size(); ++i) {
+    EXPECT_EQ(a.recent_fixes[i].stamp_ns, b.recent_fixes[i].stamp_ns);
+    EXPECT_EQ(a.recent_fixes[i].accepted, b.recent_fixes[i].accepted);
+    EXPECT_EQ(a.recent_fixes[i].reason, b.recent_fixes[i].reason);
+    EXPECT_EQ(a.recent_fixes[i].antenna_map_m, b.recent_fixes[i].antenna_map_m);
+    EXPECT_EQ(a.recent_fixes[i].covariance_map_m2, b.recent_fixes[i].covariance_map_m2);
+  }
 }
 
 inline void expect_equal(const LioStatus& a, const LioStatus& b) {
@@ -326,6 +338,12 @@ inline void expect_equal(const StateUpdate& a, const StateUpdate& b) {
   }
 }
 
+inline void expect_equal(const FixVerdict& a, const FixVerdict& b) {
+  EXPECT_EQ(a.fix_stamp_ns, b.fix_stamp_ns);
+  EXPECT_EQ(a.used, b.used);
+  EXPECT_EQ(a.reason, b.reason);
+}
+
 inline void expect_equal(const FusionStatus& a, const FusionStatus& b) {
   EXPECT_EQ(a.stamp_ns, b.stamp_ns);
   EXPECT_EQ(a.mode, b.mode);
@@ -339,13 +357,15 @@ inline void expect_equal(const FusionStatus& a, const FusionStatus& b) {
   expect_equal(a.T_map_odom, b.T_map_odom);
   EXPECT_EQ(a.yaw_sigma_rad, b.yaw_sigma_rad);
   EXPECT_EQ(a.position_sigma_m, b.position_sigma_m);
-  EXPECT_EQ(a.verdict.fix_stamp_ns, b.verdict.fix_stamp_ns);
-  EXPECT_EQ(a.verdict.used, b.verdict.used);
-  EXPECT_EQ(a.verdict.reason, b.verdict.reason);
+  expect_equal(a.verdict, b.verdict);
   EXPECT_EQ(a.fixes_seen, b.fixes_seen);
   EXPECT_EQ(a.fixes_used, b.fixes_used);
   expect_equal(a.verdicts, b.verdicts);
   EXPECT_EQ(a.gps_source, b.gps_source);
+  ASSERT_EQ(a.judged.size(), b.judged.size());
+  for (std::size_t i = 0; i < a.judged.size(); ++i) {
+    expect_equal(a.judged[i], b.judged[i]);
+  }
 }
 
 }  // namespace trigpoint::bus::samples

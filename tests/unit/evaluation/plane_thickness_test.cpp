@@ -161,5 +161,25 @@ TEST(FacadeThickness, of_a_sample_of_a_large_map_is_that_of_the_whole) {
   EXPECT_NEAR(sample.median_m, whole.median_m, kSampling * whole.median_m);
 }
 
+TEST(FacadeOffset, is_how_far_the_same_wall_lies_apart_in_two_clouds) {
+  const PointCloud first = Scene(1).add(Wall{}, 0.02).cloud();
+  for (const double apart_m : {0.0, 0.03, 0.12}) {
+    const FacadeOffset offset = facade_offset(first, Scene(2).add(Wall{}, 0.02, apart_m).cloud());
+    EXPECT_GT(offset.planes, 15U);
+    EXPECT_NEAR(offset.median_m, apart_m, 0.004) << apart_m;
+    EXPECT_NEAR(offset.p90_m, apart_m, 0.008) << apart_m;
+  }
+}
+
+TEST(FacadeOffset, is_unknown_where_the_clouds_share_no_wall) {
+  Wall turned;
+  turned.yaw_rad += 1.0;
+  turned.corner_m.x() += 40.0;
+  const FacadeOffset offset = facade_offset(Scene(1).add(Wall{}, 0.02).cloud(),
+                                            Scene(2).add(turned, 0.02).add_ground(0.0).cloud());
+  EXPECT_EQ(offset.planes, 0U);
+  EXPECT_TRUE(std::isnan(offset.p90_m));
+}
+
 }  // namespace
 }  // namespace trigpoint::evaluation

@@ -68,7 +68,7 @@ TEST(Displacement, predicts_the_scatter_of_what_it_accounts_for) {
   std::mt19937_64 random(4);
   std::normal_distribution<double> normal;
   const double yaw_walk = config.smooth.lio_yaw_drift_rad_per_sqrt_m * std::sqrt(30.0 / 3.0);
-  const double walk_m = config.alignment.lio_drift_m_per_sqrt_m * std::sqrt(30.0);
+  const double walk_m = config.smooth.lio_drift_m_per_sqrt_m * std::sqrt(30.0);
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   constexpr int kRuns = 20000;
   for (int run = 0; run < kRuns; ++run) {

@@ -191,7 +191,7 @@ TEST(FusionGate, refuses_fixes_that_are_too_late_with_the_numbers) {
   scenario.fix_latency_s = 1.5;
   const Record record = SimulatedDrive{scenario}.run();
   EXPECT_TRUE(record.updates.empty());
-  EXPECT_THAT(record.statuses.back().verdict.reason, HasSubstr("s behind LIO, limit 1.00 s"));
+  EXPECT_THAT(record.statuses.back().verdict.reason, HasSubstr("s behind LIO, limit 1.30 s"));
   EXPECT_GT(count_of(record.statuses.back(), "late"), 100U);
 }
 
@@ -202,6 +202,8 @@ TEST(FusionGate, judges_a_repeated_status_once) {
   const GpsStatus status = drive.status(20.0);
   drive.keep(drive.gate().on_gps_status(status, "gps-a"));
   drive.keep(drive.gate().on_gps_status(status, "gps-a"));
+  drive.gps_alive = false;
+  drive.run_until(22.0);
   EXPECT_EQ(drive.record().updates.size(), before + 1);
 }
 
@@ -214,6 +216,8 @@ TEST(FusionGate, judges_a_fix_once_when_statuses_come_shuffled) {
   for (const GpsStatus& status : {newer, older, newer, older}) {
     drive.keep(drive.gate().on_gps_status(status, "gps-a"));
   }
+  drive.gps_alive = false;
+  drive.run_until(22.0);
   EXPECT_EQ(drive.record().updates.size(), before + 2);
 }
 
@@ -232,7 +236,7 @@ TEST(FusionGate, mixes_no_pairs_of_two_odom_epochs) {
       EXPECT_NEAR(update.first_alignment->T_map_odom.yaw_rad, moved.yaw_rad, 1e-3);
     }
   }
-  EXPECT_GT(of_new_epoch, 20U);
+  EXPECT_GT(of_new_epoch, 10U);  // one in half a second
 }
 
 TEST(FusionGate, aligns_anew_in_a_new_odom_epoch) {
@@ -339,6 +343,7 @@ TEST(FusionGate, changes_over_between_two_filters_without_using_a_fix_twice) {
     odometry.T_frame_child = drive.T_map_base(now_s);
     drive.keep(drive.gate().on_gps_odometry(odometry, "gps-b"));
     drive.keep(drive.gate().on_gps_status(drive.status(now_s), "gps-b"));
+    drive.run_until(now_s + 0.2);
   }
   EXPECT_EQ(drive.record().statuses.back().gps_source, "gps-b");
   std::set<Nanoseconds> stamps;

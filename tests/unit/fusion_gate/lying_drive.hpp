@@ -14,7 +14,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <functional>
 #include <map>
 #include <numbers>
@@ -40,6 +39,8 @@ struct LyingDriveSettings {
   double lio_jump_at_s{1e9};
   YawPose T_map_odom{2.0, {30.0, -10.0, 5.0}};
   double fix_latency_s{0.13};
+  std::function<double(std::size_t)> delay_s;  ///< besides, by the number of the fix; may be empty
+  bool with_records{true};                     ///< the filter tells of all recent fixes
 };
 
 struct DriveSample {
@@ -84,6 +85,7 @@ class LyingDrive {
   std::vector<StateUpdate> updates;
   Events events;
   std::map<long long, std::array<bool, 3>> used;  ///< by the fix's tick: axes that became rows
+  std::map<Nanoseconds, FixVerdict> verdicts;     ///< by the fix's stamp
 
   double rms(int first_axis, int last_axis, double from_s = 0.0) const {
     double sum = 0.0;
@@ -220,27 +222,45 @@ class LyingDrive {
     raw.altitude_m = place.height_m;
     raw.covariance_type = CovarianceType::kDiagonalKnown;
     raw.covariance_enu_m2 = claimed_m().cwiseAbs2().asDiagonal();
+    const FixRecord record{
+        raw.stamp_ns, true, "", antenna_m, (2.0 * claimed_m()).cwiseAbs2().asDiagonal()};
+    const double delay_s = s_.delay_s ? s_.delay_s(fixes_.size()) : 0.0;
+    fixes_.push_back(std::llround(now_s_ / kTick_s));
+    waiting_.emplace(now_s_ + s_.fix_latency_s + delay_s, Waiting{raw, record});
+  }
+
+  void deliver() {
+    while (!waiting_.empty() && waiting_.begin()->first <= now_s_) {
+      const Waiting come = waiting_.begin()->second;
+      waiting_.erase(waiting_.begin());
+      keep(gate_.on_fix(come.fix));
+      keep(gate_.on_gps_status(status_with(come.record), "gps"));
+    }
+  }
+
+  /// A filter that believes every fix and keeps what it holds of those of 1.5 s.
+  GpsStatus status_with(const FixRecord& record) {
+    recent_[record.stamp_ns] = record;
+    std::erase_if(recent_,
+                  [&](const auto& held) { return held.first < stamp(now_s_) - from_seconds(1.5); });
+    const FixRecord& newest = recent_.rbegin()->second;
     GpsStatus status;
-    status.stamp_ns = raw.stamp_ns;
+    status.stamp_ns = stamp(now_s_);
     status.source = "believer";
     status.health = GpsHealth::kOk;
     status.datum_id = datum().id();
     status.gnss_class = GnssClass::kFixed;
-    status.last_accepted_fix_ns = raw.stamp_ns;
-    status.accepted_antenna_map_m = antenna_m;
-    status.accepted_covariance_map_m2 = (2.0 * claimed_m()).cwiseAbs2().asDiagonal();
+    status.last_accepted_fix_ns = newest.stamp_ns;
+    status.accepted_antenna_map_m = newest.antenna_map_m;
+    status.accepted_covariance_map_m2 = newest.covariance_map_m2;
     status.fixes_received = ++fixes_received_;
     status.fixes_accepted = fixes_received_;
-    fixes_.push_back(std::llround(now_s_ / kTick_s));
-    waiting_.push_back({now_s_ + s_.fix_latency_s, raw, status});
-  }
-
-  void deliver() {
-    while (!waiting_.empty() && waiting_.front().at_s <= now_s_) {
-      keep(gate_.on_fix(waiting_.front().fix));
-      keep(gate_.on_gps_status(waiting_.front().status, "gps"));
-      waiting_.pop_front();
+    for (const auto& [stamp_ns, held] : recent_) {
+      if (s_.with_records) {
+        status.recent_fixes.push_back(held);
+      }
     }
+    return status;
   }
 
   void gps_odometry() {
@@ -335,6 +355,9 @@ class LyingDrive {
     events.insert(events.end(), out.events.begin(), out.events.end());
     if (out.status) {
       statuses.push_back(*out.status);
+      for (const FixVerdict& verdict : out.status->judged) {
+        verdicts[verdict.fix_stamp_ns] = verdict;
+      }
     }
     if (out.fused) {
       samples.push_back({now_s_,
@@ -355,9 +378,8 @@ class LyingDrive {
   };
 
   struct Waiting {
-    double at_s;
     GnssFix fix;
-    GpsStatus status;
+    FixRecord record;
   };
 
   LyingDriveSettings s_;
@@ -373,8 +395,9 @@ class LyingDrive {
   Eigen::Vector3d p_odom_m_{Eigen::Vector3d::Zero()};
   Eigen::Vector3d slow_m_{Eigen::Vector3d::Zero()};
   std::map<long long, Poses> poses_;
-  std::vector<long long> fixes_;  // ticks
-  std::deque<Waiting> waiting_;
+  std::vector<long long> fixes_;            // ticks
+  std::multimap<double, Waiting> waiting_;  // by when they come
+  std::map<Nanoseconds, FixRecord> recent_;
   std::uint64_t fixes_received_{0};
   bool aligned_{false};
   YawPose T_;

@@ -193,6 +193,50 @@ TEST_P(SmoothMode, does_not_lock_itself_out_after_a_drift_of_one_percent) {
   EXPECT_LT(drive.worst(0, 1, 130.0), 0.1);
 }
 
+/// Late by half a second, three in ten by up to as much again.
+double shuffling_delay_s(std::size_t fix) {
+  return 0.5 + (fix % 10 < 3 ? 0.1 + 0.17 * static_cast<double>(fix % 4) : 0.0);
+}
+
+/// Fixes of whose verdict or rows the two drives do not agree.
+std::size_t judged_otherwise(const LyingDrive& a, const LyingDrive& b, double until_s) {
+  std::size_t count = 0;
+  for (const auto& [stamp_ns, verdict] : a.verdicts) {
+    const double at_s = to_seconds(stamp_ns) - 1000.0;
+    const auto other = b.verdicts.find(stamp_ns);
+    const long long tick = std::llround(at_s / 0.01);
+    const auto rows_of = [&](const LyingDrive& drive) {
+      const auto found = drive.used.find(tick);
+      return found == drive.used.end() ? std::array<bool, 3>{} : found->second;
+    };
+    if (at_s < until_s && (other == b.verdicts.end() || other->second.used != verdict.used ||
+                           rows_of(a) != rows_of(b))) {
+      ++count;
+    }
+  }
+  return count;
+}
+
+TEST_P(SmoothMode, judges_late_and_shuffled_fixes_as_it_judges_sorted_ones) {
+  settings.lie_enu_m = [=, this](double at_s) {
+    return Eigen::Vector3d((at_s >= 70.0 && at_s < 100.0 ? 4.0 : 0.0) * aside);
+  };
+  LyingDrive sorted(settings);
+  sorted.run();
+  settings.delay_s = shuffling_delay_s;
+  LyingDrive shuffled(settings);
+  shuffled.run();
+  const double end_s = settings.duration_s - 3.0;
+  EXPECT_GT(sorted.verdicts.size(), 700U);
+  EXPECT_EQ(judged_otherwise(sorted, shuffled, end_s), 0U);
+  EXPECT_EQ(shuffled.count("behind_newer_fix"), 0U);
+  // A filter that tells of its newest accepted fix only cannot be judged so.
+  settings.with_records = false;
+  LyingDrive newest_only(settings);
+  newest_only.run();
+  EXPECT_GT(judged_otherwise(sorted, newest_only, end_s), 50U);
+}
+
 INSTANTIATE_TEST_SUITE_P(Seeds, SmoothMode, testing::Values(11, 12, 13));
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include "trigpoint/base/so3.hpp"
 
+#include "checks/accepted_fix.hpp"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -22,6 +23,7 @@ struct Drive {
   double speed_mps{1.2};
   double turn_radps{0.0};
   double sigma_m{0.02};
+  double claimed_over_true{1.0};  ///< sigmas
 };
 
 /// Noise-free pairs along a straight line or an arc.
@@ -139,6 +141,9 @@ Spread measure_spread(const Drive& drive) {
   for (unsigned seed = 1; seed <= kSeeds; ++seed) {
     std::vector<AlignmentPair> pairs = drive_pairs(drive, kTruth);
     add_errors(pairs, config, seed);
+    for (AlignmentPair& pair : pairs) {
+      pair.variance_map_m2 *= drive.claimed_over_true * drive.claimed_over_true;
+    }
     const AlignmentSolution solution = solve_alignment(pairs, config).value();
     // LIO's walk is counted back from the newest pair: the truth is the transform that maps the
     // newest pair's drifted position to where it is.
@@ -180,6 +185,17 @@ TEST(YawAlignment, predicts_the_yaw_error_of_coarse_gps_with_correlated_errors) 
   const Spread spread = measure_spread(drive);
   EXPECT_GT(spread.yaw_rms_rad / spread.yaw_sigma_rad, kLowestRatio);
   EXPECT_LT(spread.yaw_rms_rad / spread.yaw_sigma_rad, kHighestRatio);
+}
+
+// Residuals tell of the white part only; the slow one stays what was said, or a fourth of it.
+TEST(YawAlignment, believes_fixes_that_scatter_less_than_a_cautious_filter_says) {
+  const Spread as_said = measure_spread({});
+  Drive cautious;
+  cautious.claimed_over_true = 2.0;
+  const Spread spread = measure_spread(cautious);
+  EXPECT_LT(spread.yaw_sigma_rad, 1.4 * as_said.yaw_sigma_rad);  // 2 without it
+  EXPECT_GT(spread.yaw_rms_rad / spread.yaw_sigma_rad, 0.65);
+  EXPECT_LT(spread.nees, 4.0 * 1.25);
 }
 
 TEST(YawAlignment, would_be_overconfident_without_the_correlation) {
@@ -238,8 +254,9 @@ TEST(YawAlignment, gives_the_covariance_of_a_hand_made_case) {
     pairs.push_back(pair);
   }
   const AlignmentSolution solution = solve_alignment(pairs, config).value();
-  EXPECT_NEAR(solution.covariance(0, 0), 0.04 / sum_m2, 1e-7);
-  EXPECT_NEAR(solution.covariance(1, 1), 0.04 / 11.0, 1e-7);
+  // Pairs that fit exactly are better than they say, as far as that is granted.
+  EXPECT_NEAR(solution.covariance(0, 0), kFilterMargin * 0.04 / sum_m2, 1e-7);
+  EXPECT_NEAR(solution.covariance(1, 1), kFilterMargin * 0.04 / 11.0, 1e-7);
   EXPECT_NEAR(solution.covariance(0, 1), 0.0, 1e-9);
 }
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 #include <random>
 
 namespace trigpoint::gps_odometry {
@@ -17,10 +18,12 @@ Sensors rtk_robot() {
   return sensors;
 }
 
-/// The last odometry and status of a filter that got these inputs in this order.
+/// The last odometry and status of a filter that got these inputs in this order, and what it held
+/// last of every fix.
 struct End {
   Odometry odometry;
   GpsStatus status;
+  std::map<Nanoseconds, FixRecord> records;
 };
 
 End end_of(const std::vector<Input>& inputs, const Sensors& sensors, const std::string& name) {
@@ -35,6 +38,9 @@ End end_of(const std::vector<Input>& inputs, const Sensors& sensors, const std::
     }
     if (output.status) {
       end.status = *output.status;
+      for (const FixRecord& record : end.status.recent_fixes) {
+        end.records[record.stamp_ns] = record;
+      }
     }
   }
   return end;
@@ -53,6 +59,14 @@ void expect_equal(const End& late, const End& sorted) {
   EXPECT_LT(
       (late.status.accepted_covariance_map_m2 - sorted.status.accepted_covariance_map_m2).norm(),
       kSameResult);
+  ASSERT_EQ(late.records.size(), sorted.records.size());
+  for (const auto& [stamp_ns, record] : sorted.records) {
+    const FixRecord& held = late.records.at(stamp_ns);
+    EXPECT_EQ(held.accepted, record.accepted);
+    EXPECT_EQ(held.reason, record.reason);
+    EXPECT_LT((held.antenna_map_m - record.antenna_map_m).norm(), kSameResult);
+    EXPECT_LT((held.covariance_map_m2 - record.covariance_map_m2).norm(), kSameResult);
+  }
 }
 
 std::vector<Input> sorted_by_stamp(std::vector<Input> inputs) {
@@ -125,7 +139,7 @@ TEST_P(Rewind, refuses_and_counts_a_fix_older_than_the_buffer) {
   for (int i = 0; i < 300; ++i) {
     filter.on_imu(imu_at(0.01 * i));
   }
-  const GpsStatus status = *filter.on_fix(fix_at({0.0, 0.0, 0.0}, 1.9, 0.014)).status;
+  const GpsStatus status = *filter.on_fix(fix_at({0.0, 0.0, 0.0}, 1.4, 0.014)).status;
   EXPECT_EQ(count_of(status, "too_old"), 1U);
   EXPECT_EQ(status.fixes_accepted, 0U);
   EXPECT_EQ(filter.on_fix(fix_at({0.0, 0.0, 0.0}, 2.1, 0.014)).status->fixes_accepted, 1U);

@@ -44,7 +44,7 @@ std::optional<Alignment> PlacementHistory::as_of(Nanoseconds stamp_ns,
   }
   const Placement& then = *std::prev(later);
   const double since_m = std::max(0.0, distance_m - then.distance_m);
-  const double walk = config_.alignment.lio_drift_m_per_sqrt_m;
+  const double walk = config_.smooth.lio_drift_m_per_sqrt_m;
   const double yaw_walk = config_.smooth.lio_yaw_drift_rad_per_sqrt_m;
   const Odometry old = place(here_odom_m, then.T_map_odom, then.covariance);
   Eigen::Vector3d here_map_m = old.T_frame_child.p;

@@ -8,6 +8,7 @@
 
 #include "trigpoint/base/so3.hpp"
 
+#include "checks/accepted_fix.hpp"
 #include "sentence.hpp"
 #include <Eigen/Cholesky>
 
@@ -28,6 +29,7 @@ constexpr double kTrustedSquaredSigmas = 6.0;
 constexpr double kCauchyScale = 3.0;
 constexpr double kOutlierWeight = 0.3;  // a residual above 5.2 sigma
 constexpr double kMaxOutlierShare = 0.35;
+constexpr double kStandardNormal999 = 3.0902;
 constexpr int kClosedFormIterations = 15;
 constexpr int kMaxIterations = 15;
 constexpr double kConverged = 1e-8;  // rad and m
@@ -248,11 +250,20 @@ double horizontal_extent(const std::vector<AlignmentPair>& pairs) {
   return (highest - lowest).norm();
 }
 
-/// [3], the 99.9 % quantile.
-double chi_square_quantile(double degrees_of_freedom) {
-  constexpr double kStandardNormal999 = 3.0902;
+/// [3], of the probability below so many sigmas of the standard normal variable.
+double chi_square_quantile(double degrees_of_freedom, double standard_normal) {
   const double v = 2.0 / (9.0 * degrees_of_freedom);
-  return degrees_of_freedom * std::pow(1.0 - v + kStandardNormal999 * std::sqrt(v), 3.0);
+  return degrees_of_freedom * std::pow(1.0 - v + standard_normal * std::sqrt(v), 3.0);
+}
+
+/// By what the stated variances are wrong, as the residuals tell (the a-posteriori variance
+/// factor). Above 1 as it is; below 1 only as far as 95 % of all samples would allow, and no
+/// further than the margin that GPS filters take.
+double variance_factor(double chi_square, double degrees_of_freedom, bool many) {
+  constexpr double kStandardNormal005 = -1.6449;
+  const double factor = chi_square / degrees_of_freedom;
+  const double at_most = chi_square / chi_square_quantile(degrees_of_freedom, kStandardNormal005);
+  return factor > 1.0 || !many ? std::max(1.0, factor) : std::clamp(at_most, kFilterMargin, 1.0);
 }
 
 double outlier_share_of(const RobustWeights& weights) {
@@ -294,10 +305,13 @@ std::optional<AlignmentSolution> solve_alignment(const std::vector<AlignmentPair
   solution.baseline_m = horizontal_extent(pairs);
   const double dof = std::max(1.0, 3.0 * static_cast<double>(pairs.size()) - 4.0);
   solution.chi_square = system.chi_square;
-  solution.chi_square_limit = config.residual_tolerance * chi_square_quantile(dof);
+  solution.chi_square_limit =
+      config.residual_tolerance * chi_square_quantile(dof, kStandardNormal999);
   solution.outlier_share = outlier_share_of(weights);
-  const Matrix5d covariance = system.information.ldlt().solve(Matrix5d::Identity()) *
-                              std::max(1.0, system.chi_square / dof);
+  const Matrix5d covariance =
+      system.information.ldlt().solve(Matrix5d::Identity()) *
+      variance_factor(
+          system.chi_square, dof, pairs.size() >= static_cast<std::size_t>(config.min_pairs));
   solution.covariance = covariance.topLeftCorner<4, 4>();
   if (scale_sigma > 0.0) {
     solution.scale_covariance = covariance.col(4);

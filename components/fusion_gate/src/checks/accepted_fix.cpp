@@ -32,10 +32,12 @@ std::optional<Refusal> check_status(const GpsStatus& status, const std::string& 
     return Refusal{"other_datum",
                    "the GPS source uses datum " + status.datum_id + ", ours is " + datum_id};
   }
-  if (status.health != GpsHealth::kOk && status.health != GpsHealth::kDegraded) {
+  // A fix that comes late finds the filter dead reckoning; its age is judged by itself.
+  const bool healthy = status.health == GpsHealth::kOk || status.health == GpsHealth::kDegraded ||
+                       status.health == GpsHealth::kDeadReckoning;
+  if (!healthy) {
     return Refusal{std::string("health_") + name_of(status.health),
-                   std::string("health of the GPS source is ") + name_of(status.health) +
-                       ", needs ok or degraded"};
+                   std::string("health of the GPS source is ") + name_of(status.health)};
   }
   return std::nullopt;
 }

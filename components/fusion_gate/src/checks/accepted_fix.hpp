@@ -16,7 +16,12 @@ struct AcceptedFix {
   Nanoseconds stamp_ns{0};
   Eigen::Vector3d antenna_map_m{Eigen::Vector3d::Constant(kNaN)};
   Eigen::Matrix3d covariance_map_m2{Eigen::Matrix3d::Identity() * kUnknownVariance};
+  bool is_recorded{false};  ///< told of in a record of its own
 };
+
+/// GPS filters double the sigmas that receivers report and add floors, because some receivers are
+/// optimistic. Where LIO testifies that this one is not, a variance may be so much smaller.
+inline constexpr double kFilterMargin = 0.25;
 
 /// Why something is refused: `code` is short, stable and counted, `reason` is the sentence.
 struct Refusal {

@@ -61,7 +61,7 @@ double permitted_m(const Difference& difference, Part part, double sigmas) {
 Eigen::Vector3d lio_drift_variance_m2(const Eigen::Vector3d& blind_m,
                                       double distance_m,
                                       const Config& config) {
-  const double walk = config.alignment.lio_drift_m_per_sqrt_m;
+  const double walk = config.smooth.lio_drift_m_per_sqrt_m;
   const double share_m = config.smooth.lio_drift_share * distance_m;
   const double held_m2 = std::max(walk * walk * distance_m, share_m * share_m);
   return Eigen::Vector3d(blind_m.cwiseAbs2().array() + held_m2);

@@ -43,6 +43,7 @@ void Verdicts::record(Nanoseconds fix_stamp_ns,
                       const std::string& code,
                       const std::string& reason) {
   newest_ = {fix_stamp_ns, used, reason};
+  new_.push_back(newest_);
   used_ += used ? 1 : 0;
   ++total_;
   ++counts_[code];

@@ -8,6 +8,7 @@
 #include <deque>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace trigpoint::fusion_gate {
@@ -33,6 +34,9 @@ class Verdicts {
 
   const FixVerdict& newest() const { return newest_; }
 
+  /// Those that were recorded since this was asked last.
+  std::vector<FixVerdict> take_new() { return std::exchange(new_, {}); }
+
   std::uint64_t used() const { return used_; }
 
   std::uint64_t total() const { return total_; }
@@ -42,6 +46,7 @@ class Verdicts {
  private:
   std::deque<Nanoseconds> judged_ns_;  // the newest ones; bounded
   FixVerdict newest_;
+  std::vector<FixVerdict> new_;
   std::uint64_t used_{0};
   std::uint64_t total_{0};
   std::map<std::string, std::uint64_t> counts_;

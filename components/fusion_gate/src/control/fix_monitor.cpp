@@ -63,7 +63,7 @@ Eigen::Vector3d FixMonitor::blind_variance_map_m2(const LioStatus& lio) const {
 
 Eigen::Vector3d FixMonitor::scatter_map_m2(const LioStatus& lio) const {
   const Eigen::Matrix3d R_map_odom = lio.T_map_odom.pose().q.toRotationMatrix();
-  Eigen::Vector3d result = Eigen::Vector3d::Zero();
+  Eigen::Vector3d result = Eigen::Vector3d::Constant(kNaN);
   for (int axis = 0; axis < 3; ++axis) {
     const std::size_t part = index_of(axis < 2 ? Part::kLevel : Part::kHeight);
     std::vector<double> offsets_m;

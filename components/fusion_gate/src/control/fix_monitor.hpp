@@ -57,7 +57,7 @@ class FixMonitor {
   bool is_blind(const LioStatus& lio, int axis_map) const;
 
   /// Variance of the trusted fixes of the last 30 s against LIO's displacement, less what LIO may
-  /// have drifted: what the fixes are worth, whatever they say of themselves. Zero when there are
+  /// have drifted: what the fixes are worth, whatever they say of themselves. NaN when there are
   /// too few of them, or LIO was blind.
   Eigen::Vector3d scatter_map_m2(const LioStatus& lio) const;
 

@@ -57,6 +57,17 @@ struct ResetInfo {
   YawPose delta;  ///< of the newest reset
 };
 
+/// What a GPS filter holds of one fix. A late fix that is put in its place behind newer ones
+/// changes what is held of those.
+struct FixRecord {
+  Nanoseconds stamp_ns{0};
+  bool accepted{false};
+  std::string reason;  ///< why it was refused
+  /// The posterior of the antenna at the stamp, in map; only of an accepted one.
+  Eigen::Vector3d antenna_map_m{Eigen::Vector3d::Constant(kNaN)};
+  Eigen::Matrix3d covariance_map_m2{Eigen::Matrix3d::Identity() * kUnknownVariance};
+};
+
 struct GpsStatus {
   Nanoseconds stamp_ns{0};
   std::string source;  ///< program and version, e.g. "ekf15"
@@ -74,6 +85,10 @@ struct GpsStatus {
   std::vector<NamedCount> rejections;  ///< by reason
   std::uint64_t imu_received{0};
   ResetInfo reset;
+  /// Of the fixes that a later one can still change, by stamp; with them a fix is told of also when
+  /// a newer one came first. Empty: the filter keeps none, and last_accepted_fix_ns is all it
+  /// tells.
+  std::vector<FixRecord> recent_fixes;
 };
 
 enum class LioHealth : std::uint8_t { kInit, kOk, kDegraded, kLost, kStale };
@@ -149,11 +164,12 @@ struct FusionStatus {
   YawPose T_map_odom;
   double yaw_sigma_rad{kNaN};
   std::array<double, 3> position_sigma_m{kNaN, kNaN, kNaN};
-  FixVerdict verdict;  ///< on the newest fix
+  FixVerdict verdict;  ///< the newest one
   std::uint64_t fixes_seen{0};
   std::uint64_t fixes_used{0};
   std::vector<NamedCount> verdicts;  ///< by reason
   std::string gps_source;            ///< the writer that is followed
+  std::vector<FixVerdict> judged;    ///< every verdict since the status before, in their order
 };
 
 }  // namespace trigpoint

@@ -35,4 +35,15 @@ struct PlaneThickness {
 /// up to `most_points` of them; the same cloud gives the same result.
 PlaneThickness facade_thickness(const PointCloud& cloud, const PlaneThicknessOptions& options = {});
 
+/// How far the same walls lie apart in two clouds of one frame.
+struct FacadeOffset {
+  std::size_t planes{0};  ///< walls that both hold; 0: the numbers below are NaN
+  double median_m{kNaN};
+  double p90_m{kNaN};  ///< nearest rank
+};
+
+/// Of the walls that facade_thickness finds in each of them. Walls more than 0.4 m or 10 degrees
+/// apart are taken for different ones.
+FacadeOffset facade_offset(const PointCloud& first, const PointCloud& second);
+
 }  // namespace trigpoint::evaluation

@@ -21,23 +21,24 @@ struct AlignmentConfig {
   std::int64_t max_pairs{120};  ///< above it every second one is dropped
   double pair_spacing_m{0.25};  ///< a nearer pair is taken only after pair_spacing_s
   double pair_spacing_s{2.0};
-  double window_m{200.0};               ///< pairs driven longer ago are forgotten: LIO drifts
-  double max_interpolation_gap_s{0.6};  ///< between two LIO poses
-  double correlation_time_s{40.0};      ///< of the slow part of the GPS error
-  double correlated_share{0.7};         ///< of the reported variance: Gauss-Markov
-  double white_share{0.5};              ///< of the reported variance: new at every fix
-  double lio_drift_m_per_sqrt_m{0.02};  ///< random walk of LIO with the distance driven
-  double lio_tilt_sigma_rad{0.01};      ///< of odom, which no GPS height can tell from z at once
-  double residual_tolerance{4.0};       ///< chi-square may exceed its 99.9 % quantile by this
+  double window_m{200.0};                ///< pairs driven longer ago are forgotten: LIO drifts
+  double max_interpolation_gap_s{0.6};   ///< between two LIO poses
+  double correlation_time_s{40.0};       ///< of the slow part of the GPS error
+  double correlated_share{0.7};          ///< of the reported variance: Gauss-Markov
+  double white_share{0.5};               ///< of the reported variance: new at every fix
+  double lio_drift_m_per_sqrt_m{0.005};  ///< random walk of LIO with the distance driven
+  double lio_tilt_sigma_rad{0.01};       ///< of odom, which no GPS height can tell from z at once
+  double residual_tolerance{4.0};        ///< chi-square may exceed its 99.9 % quantile by this
 };
 
 /// What mode smooth asks beyond Algorithm I (README, "Mode smooth").
 struct SmoothConfig {
-  double leave_factor{1.25};      ///< an open axis closes above this times its threshold
-  double leave_sigmas{3.0};       ///< a trusted fix is doubted beyond
-  double enter_sigmas{2.5};       ///< a doubted one is trusted again within
-  double raw_sigma_scale{2.0};    ///< receivers are optimistic
-  double lio_drift_share{0.003};  ///< of the distance, one sigma; beside the random walk
+  double leave_factor{1.25};            ///< an open axis closes above this times its threshold
+  double leave_sigmas{3.0};             ///< a trusted fix is doubted beyond
+  double enter_sigmas{2.5};             ///< a doubted one is trusted again within
+  double raw_sigma_scale{2.0};          ///< receivers are optimistic
+  double lio_drift_m_per_sqrt_m{0.02};  ///< what LIO may drift before a fix is doubted, one sigma
+  double lio_drift_share{0.003};        ///< of the distance, one sigma; beside the random walk
   double lio_yaw_drift_rad_per_sqrt_m{0.00035};
   double lio_blind_sigma_m{0.03};  ///< along an axis that is worse held by the map LIO may slide
   double readmit_s{10.0};          ///< longest stretch that fixes must agree for after a doubt
@@ -56,15 +57,15 @@ struct Config {
   double min_sigma_m{0.02};                  ///< floor of a fix's sigma
   double gps_correlation_time_s{5.0};        ///< row covariance x (1 + 2 tau / dt)
   double max_inflation{100.0};               ///< of that factor
-  double max_fix_age_s{1.0};                 ///< against LIO's newest stamp
-  double source_timeout_s{1.0};              ///< a GPS writer not heard for longer is stale
-  double source_hold_s{0.5};                 ///< a healthier one must stay so for this long
-  double lio_timeout_s{1.0};                 ///< then the GPS odometry carries fusion/odometry
-  double gps_only_after_s{10.0};             ///< the same where there has never been a LIO
-  double imu_rate_timeout_s{0.5};            ///< then lio/odometry carries fusion/odometry
-  double status_period_s{0.2};               ///< of fusion/status between fixes, data time
-  double foreign_after_s{2.0};               ///< a GPS writer without gps/status is foreign then
-  double unknown_fix_sigma_m{3.0};           ///< of a raw fix that says nothing about itself
+  double max_fix_age_s{1.3};  ///< against LIO's newest stamp; so long an earlier one is waited for
+  double source_timeout_s{1.0};     ///< a GPS writer not heard for longer is stale
+  double source_hold_s{0.5};        ///< a healthier one must stay so for this long
+  double lio_timeout_s{1.0};        ///< then the GPS odometry carries fusion/odometry
+  double gps_only_after_s{10.0};    ///< the same where there has never been a LIO
+  double imu_rate_timeout_s{0.5};   ///< then lio/odometry carries fusion/odometry
+  double status_period_s{0.2};      ///< of fusion/status between fixes, data time
+  double foreign_after_s{2.0};      ///< a GPS writer without gps/status is foreign then
+  double unknown_fix_sigma_m{3.0};  ///< of a raw fix that says nothing about itself
   AlignmentConfig alignment;
   SmoothConfig smooth;
 };

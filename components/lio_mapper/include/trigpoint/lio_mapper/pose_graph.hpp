@@ -125,6 +125,7 @@ CorrectedPast correct_past(const GraphInput& input,
 struct MapSample {
   Nanoseconds stamp_ns{0};
   Pose T_map_base;
+  std::size_t sweep{0};  ///< its place in GraphInput::trajectory
 };
 
 /// The trajectory of every sweep, carried over: between two keyframes the pose that each of them

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "checks/fix_queue.hpp"
+
+#include <algorithm>
+#include <vector>
+
+namespace trigpoint::fusion_gate {
+
+namespace {
+
+constexpr std::size_t kKnown = 32;
+constexpr std::size_t kLeastKnown = 8;    // fewer do not tell the receiver's interval
+constexpr double kLongestInterval = 1.6;  // of the usual one: stamps jitter, a lost fix makes two
+constexpr Nanoseconds kUntilTold_ns = 100'000'000;
+
+bool is_earlier(const ToldFix& a, const ToldFix& b) {
+  return a.fix.stamp_ns < b.fix.stamp_ns;
+}
+
+}  // namespace
+
+void FixQueue::hear(Nanoseconds stamp_ns, Nanoseconds now_ns) {
+  know(stamp_ns, now_ns + kUntilTold_ns);
+}
+
+void FixQueue::put(const ToldFix& told) {
+  know(told.fix.stamp_ns, 0);
+  const auto place = std::lower_bound(waiting_.begin(), waiting_.end(), told, is_earlier);
+  if (place != waiting_.end() && place->fix.stamp_ns == told.fix.stamp_ns) {
+    *place = told;
+  } else {
+    waiting_.insert(place, told);
+  }
+}
+
+const ToldFix* FixQueue::find(Nanoseconds stamp_ns) const {
+  const auto found = std::find_if(waiting_.begin(), waiting_.end(), [&](const ToldFix& told) {
+    return told.fix.stamp_ns == stamp_ns;
+  });
+  return found == waiting_.end() ? nullptr : &*found;
+}
+
+const ToldFix* FixQueue::next(Nanoseconds now_ns) const {
+  if (waiting_.empty()) {
+    return nullptr;
+  }
+  const ToldFix& oldest = waiting_.front();
+  const bool waited_enough = to_seconds(now_ns - oldest.fix.stamp_ns) >= window_s_;
+  return waited_enough || is_predecessor_known(oldest.fix.stamp_ns, now_ns) ? &oldest : nullptr;
+}
+
+ToldFix FixQueue::take() {
+  const ToldFix oldest = waiting_.front();
+  waiting_.pop_front();
+  newest_judged_ns_ = std::max(newest_judged_ns_, oldest.fix.stamp_ns);
+  return oldest;
+}
+
+/// From fix to fix back to one that has its verdict, or for which nobody waits any more.
+bool FixQueue::is_predecessor_known(Nanoseconds stamp_ns, Nanoseconds now_ns) const {
+  const auto interval_ns = usual_interval_ns();
+  if (!interval_ns) {
+    return false;
+  }
+  Nanoseconds at_ns = stamp_ns;
+  for (auto it = known_.lower_bound(stamp_ns); it != known_.begin();) {
+    --it;
+    if (it->second > now_ns) {
+      return false;  // heard, and the filter is about to tell of it
+    }
+    if (to_seconds(at_ns - it->first) > kLongestInterval * to_seconds(*interval_ns)) {
+      return false;
+    }
+    at_ns = it->first;
+    if (at_ns <= newest_judged_ns_ || to_seconds(now_ns - at_ns) >= window_s_) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// The lower quartile of the intervals: some are longer because a fix between is missing.
+std::optional<Nanoseconds> FixQueue::usual_interval_ns() const {
+  if (known_.size() < kLeastKnown) {
+    return std::nullopt;
+  }
+  std::vector<Nanoseconds> intervals_ns;
+  for (auto it = std::next(known_.begin()); it != known_.end(); ++it) {
+    intervals_ns.push_back(it->first - std::prev(it)->first);
+  }
+  const auto quartile = intervals_ns.begin() + static_cast<std::ptrdiff_t>(intervals_ns.size() / 4);
+  std::nth_element(intervals_ns.begin(), quartile, intervals_ns.end());
+  return *quartile;
+}
+
+void FixQueue::know(Nanoseconds stamp_ns, Nanoseconds from_ns) {
+  const auto [entry, is_new] = known_.try_emplace(stamp_ns, from_ns);
+  entry->second = std::min(entry->second, from_ns);
+  if (known_.size() > kKnown) {
+    known_.erase(known_.begin());
+  }
+}
+
+}  // namespace trigpoint::fusion_gate
