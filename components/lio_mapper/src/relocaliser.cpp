@@ -143,7 +143,7 @@ double score_of(const Hypothesis& h, const std::vector<Vector3d>& level, const L
     const Vector3d point_odom_m{c * p.x() - s * p.y() + h.p_odom_m.x(),
                                 s * p.x() + c * p.y() + h.p_odom_m.y(),
                                 p.z() + h.p_odom_m.z()};
-    if (map.match(point_odom_m, plane)) {
+    if (map.match_surface(point_odom_m, plane)) {
       const double ratio = (plane.normal.dot(point_odom_m) + plane.offset_m) / kSeen_m;
       sum += std::max(0.0, 1.0 - ratio * ratio);
     }

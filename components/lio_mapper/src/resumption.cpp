@@ -7,6 +7,7 @@
 #include "downsample.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <utility>
 
@@ -22,6 +23,9 @@ constexpr std::size_t kSweepsBetweenAttempts = 5;
 constexpr std::size_t kMostSweeps = 20;  // that are put together for a registration
 /// A robot that was restarted while it drove has gone on at most this long at its speed.
 constexpr double kLongestDrive_s = 5.0;
+/// The heading's rate while nobody looked is taken from so much of the IMU after it.
+constexpr double kTurnWindow_s = 0.2;
+constexpr double kTurned_rad = 0.2;
 /// Of a registered pose, before the first scan is matched.
 constexpr double kPositionSigma_m = 0.1;
 constexpr double kRotationSigma_rad = 0.01;
@@ -92,6 +96,20 @@ void let_biases_walk(const ImuConfig& imu, double away_s, ErrorMatrix& P) {
   walk(error::kAccelBias, imu.accel_bias_walk_mps2_sqrts, imu.initial_accel_bias_sigma_mps2);
 }
 
+/// Heading per second in the first moments of the IMU, as far as the gyro's bias is known.
+double turn_rate_radps(const ImuBuffer& imu, const StartResult& start, const Vector3d& bias_radps) {
+  const Vector3d up_base = start.initial.state.T_odom_base.q.conjugate() * Vector3d::UnitZ();
+  double sum = 0.0;
+  int count = 0;
+  for (const InertialSample& sample : imu.samples()) {
+    if (to_seconds(sample.stamp_ns - imu.oldest_ns()) < kTurnWindow_s) {
+      sum += up_base.dot(sample.gyro_radps - bias_radps);
+      ++count;
+    }
+  }
+  return count > 0 ? sum / count : 0.0;
+}
+
 }  // namespace
 
 std::string offset_text(const Pose& T_from, const Pose& T_to) {
@@ -125,19 +143,25 @@ Resumption::Resumption(const Config& config,
                        const ResumeOptions& options)
     : config_(config), checkpoint_(checkpoint), points_(std::move(points)), options_(options) {}
 
-std::vector<SearchArea> Resumption::areas(Nanoseconds now_ns) const {
+std::vector<SearchArea> Resumption::areas(Nanoseconds now_ns,
+                                          double turn_radps,
+                                          const Pose& T_first_newest) const {
   const double radius_m = config_.recovery.radius_m;
   const double yaw_rad = config_.recovery.yaw_rad;
   std::vector<SearchArea> result;
   for (const Pose& place : options_.more_places_odom) {
-    result.push_back({{place}, radius_m, yaw_rad});
+    result.push_back({{place * T_first_newest}, radius_m, yaw_rad});
   }
-  SearchArea at_checkpoint{{checkpoint_.T_odom_base}, radius_m, yaw_rad};
-  const double away_s = to_seconds(now_ns - checkpoint_.stamp_ns);
-  const Vector3d driven_m = std::max(0.0, away_s) * checkpoint_.v_odom_mps;
-  if (away_s < kLongestDrive_s && driven_m.norm() > 1.0) {
-    at_checkpoint.centres_odom.emplace_back(checkpoint_.T_odom_base.q,
-                                            checkpoint_.T_odom_base.p + driven_m);
+  const Pose& last = checkpoint_.T_odom_base;
+  SearchArea at_checkpoint{{last * T_first_newest}, radius_m, yaw_rad};
+  const double away_s = std::max(0.0, to_seconds(now_ns - checkpoint_.stamp_ns));
+  const Vector3d driven_m = away_s * checkpoint_.v_odom_mps;
+  const double turned_rad = away_s * turn_radps;
+  if (away_s < kLongestDrive_s && (driven_m.norm() > 1.0 || std::abs(turned_rad) > kTurned_rad)) {
+    // Along an arc, whose chord points half way between the headings.
+    const Pose predicted((from_yaw(turned_rad) * last.q).normalized(),
+                         last.p + from_yaw(0.5 * turned_rad) * driven_m);
+    at_checkpoint.centres_odom.push_back(predicted * T_first_newest);
   }
   result.push_back(std::move(at_checkpoint));
   return result;
@@ -194,7 +218,9 @@ std::optional<Resumption::Found> Resumption::attempt(const StartResult& start,
   const LevelScan scan{gathered.points_base, without_yaw(gathered.T_new_base.q), T_base_lidar.p};
   Workers workers(static_cast<std::size_t>(config_.matching.threads));
   obstacle_.clear();
-  for (const SearchArea& area : areas(sweeps.front().end_ns)) {
+  const double turn_radps = turn_rate_radps(imu, start, checkpoint_.gyro_bias_radps);
+  const Pose T_first_newest = start.initial.state.T_odom_base.inverse() * gathered.T_new_base;
+  for (const SearchArea& area : areas(start.initial.stamp_ns, turn_radps, T_first_newest)) {
     auto map = load_map(config_.local_map,
                         points_,
                         checkpoint_.odom_epoch,

@@ -55,7 +55,11 @@ class Resumption {
   const std::string& obstacle() const { return obstacle_; }
 
  private:
-  std::vector<SearchArea> areas(Nanoseconds now_ns) const;
+  /// Around where the newest sweep is expected: at the places known, and where speed and turn lead
+  /// from the checkpoint until `now_ns`, each moved on as the waiting sweeps themselves tell.
+  std::vector<SearchArea> areas(Nanoseconds now_ns,
+                                double turn_radps,
+                                const Pose& T_first_newest) const;
   Found compose(const StartResult& start,
                 const Pose& T_old_new,
                 const Registration& registration,

@@ -51,6 +51,35 @@ TEST(Resume, goes_on_in_the_same_odom_after_a_restart_in_the_middle_of_a_drive) 
   EXPECT_GT(resumed.scans.back().status.distance_m, stopped.status.distance_m);
 }
 
+/// A second without a mapper and a second until there are sweeps enough: more than the 30 degrees
+/// that are searched to either side of the prediction.
+TEST(Resume, predicts_the_turn_that_the_robot_makes_meanwhile) {
+  const ResumeDrive& drive = short_drive();
+  const auto heading = [&](std::size_t i) {
+    return yaw_of(drive.scans[i].odometry.T_frame_child.q);
+  };
+  constexpr std::size_t kScans = 20;
+  std::size_t stop = 10;
+  for (std::size_t i = stop; i + 2 * kScans < drive.scans.size(); ++i) {
+    if (std::abs(wrap_angle(heading(i + kScans) - heading(i))) >
+        std::abs(wrap_angle(heading(stop + kScans) - heading(stop)))) {
+      stop = i;
+    }
+  }
+  ASSERT_GT(std::abs(wrap_angle(heading(stop + kScans) - heading(stop))), 0.6);
+  const auto& stopped = drive.scans[stop];
+  const auto resumed = resume(drive,
+                              stopped.checkpoint,
+                              drive.points_until(stopped.checkpoint.stamp_ns),
+                              stopped.checkpoint.stamp_ns + from_seconds(1.0),
+                              6.0);
+  ASSERT_TRUE(said(resumed.events, "lio_resumed"));
+  ASSERT_FALSE(resumed.scans.empty());
+  const Pose* undisturbed = drive.pose_at(resumed.scans.back().odometry.stamp_ns);
+  ASSERT_NE(undisturbed, nullptr);
+  EXPECT_LT((resumed.scans.back().odometry.T_frame_child.p - undisturbed->p).norm(), kSameTrack_m);
+}
+
 TEST(Resume, begins_a_new_epoch_where_the_map_is_of_another_place_and_loses_no_sweep) {
   const ResumeDrive& drive = short_drive();
   const auto& stopped = drive.scans.at(drive.scans.size() / 2);

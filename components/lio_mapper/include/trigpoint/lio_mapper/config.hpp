@@ -101,9 +101,9 @@ struct DriftConfig {
   double yaw_sigma_rad_sqrtm{5e-5};
   double tilt_sigma_rad_sqrtm{5e-5};
   /// Share of the pose's covariance relative to the local map that the map inherits per metre.
-  double map_renewal_per_m{0.05};
+  double map_renewal_per_m{0.02};
   /// Share of the variance of the map's points across their planes that the pose gathers per metre.
-  double roughness_per_m{0.015};
+  double roughness_per_m{0.008};
 };
 
 struct RowsConfig {
