@@ -388,6 +388,9 @@ Figures against_sorted(const Drive& drive, const std::string& mode) {
 /// How a start with something wrong ends: aligned, and right from then on.
 Figures start(const Drive& drive, const std::string& mode) {
   const Run& run = drive.runs.at(mode);
+  if (run.pairs.empty()) {
+    return {figure("error at the end, m", kNaN, at_most(kStartError_m))};
+  }
   const auto wrong = stretches(drive, is_wrong);
   const Nanoseconds begin_ns = drive.truth->first_ns();
   const bool wrong_first =

@@ -173,6 +173,9 @@ TEST(EveryRow, measures_nothing_and_meets_nothing_when_a_mode_is_silent) {
     return drive;
   }();
   for (const Row& row : rows()) {
+    if (row.score_map) {
+      continue;  // makes its own drives
+    }
     for (const Figure& figure : row.score(empty, "hard")) {
       const bool of_error = figure.name.find("judged otherwise") == std::string::npos;
       EXPECT_TRUE(!figure.is_judged() || !of_error || !figure.is_met()) << row.what << figure.name;

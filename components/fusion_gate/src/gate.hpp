@@ -63,6 +63,7 @@ struct FusionGate::Impl {
 
   // --- mode smooth
   void remember_raw(const AcceptedFix& fix);
+  Eigen::Vector3d least_share_of(const Witness& witness) const;
   Witness witness_of(const AcceptedFix& fix, const PoseBuffer::Sample& at_fix) const;
   void judge_values(const AcceptedFix& fix, const PoseBuffer::Sample& at_fix, Output& out);
   void go_back(const MonitorOutcome& outcome, const Witness& witness, Output& out);

@@ -66,8 +66,13 @@ void FusionGate::Impl::add_pair(const AcceptedFix& fix,
   const bool was_admitted = window.admitted();
   const Eigen::Vector3d antenna_odom_m = at_fix.T_frame_child * robot.antenna_position_base_m;
   const Eigen::Vector3d variance_m2 = floored(fix.covariance_map_m2, config.min_sigma_m).diagonal();
-  const bool added =
-      window.add({fix.stamp_ns, fix.antenna_map_m, variance_m2, antenna_odom_m, at_fix.distance_m});
+  const Witness witness = witness_of(fix, at_fix);
+  const bool added = window.add({fix.stamp_ns,
+                                 fix.antenna_map_m,
+                                 variance_m2,
+                                 antenna_odom_m,
+                                 at_fix.distance_m,
+                                 least_share_of(witness).mean()});
   if (!window.admitted()) {
     const std::string why = window.obstacle().value_or("no solution");
     verdicts.record(fix.stamp_ns,
@@ -82,7 +87,7 @@ void FusionGate::Impl::add_pair(const AcceptedFix& fix,
       lio ? lio->odom_epoch : 0, window.solution()->T_map_odom, window.solution()->covariance};
   out.state_updates.push_back(rows.make_alignment(fix, alignment));
   alignment_sent_ns = now_ns;
-  monitor.on_alignment(witness_of(fix, at_fix));
+  monitor.on_alignment(witness);
   verdicts.record(fix.stamp_ns, true, "alignment", "carries the first alignment");
   if (!was_admitted) {
     tell(out,

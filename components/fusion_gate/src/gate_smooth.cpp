@@ -16,13 +16,14 @@ constexpr std::size_t kRawFixesKept = 64;
 constexpr double kReplacementTimeout_s = 1.0;
 constexpr double kWorthGoingBack_m = 0.01;
 
-/// A fix's covariance with the variances that were measured. Less than was said only as far as
-/// filters say too much on purpose: what is slow in the error does not scatter.
-Eigen::Matrix3d as_measured(const Eigen::Matrix3d& said_m2, const Eigen::Vector3d& scatter_m2) {
+/// A fix's covariance with the variances that were measured, and not less than the receiver's own.
+Eigen::Matrix3d as_measured(const Eigen::Matrix3d& said_m2,
+                            const Eigen::Vector3d& scatter_m2,
+                            const Eigen::Vector3d& least_share) {
   Eigen::Vector3d scale = Eigen::Vector3d::Ones();
   for (int axis = 0; axis < 3; ++axis) {
     if (std::isfinite(scatter_m2[axis])) {
-      scale[axis] = std::sqrt(std::max(kFilterMargin, scatter_m2[axis] / said_m2(axis, axis)));
+      scale[axis] = std::sqrt(std::max(least_share[axis], scatter_m2[axis] / said_m2(axis, axis)));
     }
   }
   return scale.asDiagonal() * said_m2 * scale.asDiagonal();
@@ -47,6 +48,19 @@ Witness FusionGate::Impl::witness_of(const AcceptedFix& fix,
     return r.stamp_ns == fix.stamp_ns;
   });
   return {fix, raw == raw_fixes.end() ? std::nullopt : std::optional(*raw), at_fix};
+}
+
+/// GPS filters double the sigmas that receivers report and add floors, because some receivers are
+/// optimistic. Where LIO testifies that this one is not, its own variance is what is left.
+Eigen::Vector3d FusionGate::Impl::least_share_of(const Witness& witness) const {
+  if (!witness.raw) {
+    return Eigen::Vector3d::Ones();
+  }
+  const double scale = config.smooth.raw_sigma_scale * config.smooth.raw_sigma_scale;
+  const Eigen::Vector3d own_m2 = witness.raw->covariance_map_m2.diagonal() / scale;
+  return own_m2.cwiseQuotient(witness.fix.covariance_map_m2.diagonal())
+      .cwiseMax(kLeastShare)
+      .cwiseMin(1.0);
 }
 
 void FusionGate::Impl::judge_values(const AcceptedFix& fix,
@@ -77,7 +91,8 @@ void FusionGate::Impl::judge_values(const AcceptedFix& fix,
   }
   if (any_fused(choices) || outcome.trusted[0]) {
     AcceptedFix weighted = fix;
-    weighted.covariance_map_m2 = as_measured(fix.covariance_map_m2, monitor.scatter_map_m2(*lio));
+    weighted.covariance_map_m2 =
+        as_measured(fix.covariance_map_m2, monitor.scatter_map_m2(*lio), least_share_of(witness));
     send_rows(weighted, choices, out);
     return;
   }

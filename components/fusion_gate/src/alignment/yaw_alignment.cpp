@@ -8,7 +8,6 @@
 
 #include "trigpoint/base/so3.hpp"
 
-#include "checks/accepted_fix.hpp"
 #include "sentence.hpp"
 #include <Eigen/Cholesky>
 
@@ -257,13 +256,21 @@ double chi_square_quantile(double degrees_of_freedom, double standard_normal) {
 }
 
 /// By what the stated variances are wrong, as the residuals tell (the a-posteriori variance
-/// factor). Above 1 as it is; below 1 only as far as 95 % of all samples would allow, and no
-/// further than the margin that GPS filters take.
-double variance_factor(double chi_square, double degrees_of_freedom, bool many) {
+/// factor). Above 1 as it is; below 1 only as far as 95 % of all samples would allow, and not below
+/// `least`.
+double variance_factor(double chi_square, double degrees_of_freedom, double least) {
   constexpr double kStandardNormal005 = -1.6449;
   const double factor = chi_square / degrees_of_freedom;
   const double at_most = chi_square / chi_square_quantile(degrees_of_freedom, kStandardNormal005);
-  return factor > 1.0 || !many ? std::max(1.0, factor) : std::clamp(at_most, kFilterMargin, 1.0);
+  return factor > 1.0 ? factor : std::clamp(at_most, least, 1.0);
+}
+
+double least_share_of(const std::vector<AlignmentPair>& pairs) {
+  double sum = 0.0;
+  for (const AlignmentPair& pair : pairs) {
+    sum += pair.least_share;
+  }
+  return std::min(1.0, sum / static_cast<double>(pairs.size()));
 }
 
 double outlier_share_of(const RobustWeights& weights) {
@@ -308,10 +315,8 @@ std::optional<AlignmentSolution> solve_alignment(const std::vector<AlignmentPair
   solution.chi_square_limit =
       config.residual_tolerance * chi_square_quantile(dof, kStandardNormal999);
   solution.outlier_share = outlier_share_of(weights);
-  const Matrix5d covariance =
-      system.information.ldlt().solve(Matrix5d::Identity()) *
-      variance_factor(
-          system.chi_square, dof, pairs.size() >= static_cast<std::size_t>(config.min_pairs));
+  const Matrix5d covariance = system.information.ldlt().solve(Matrix5d::Identity()) *
+                              variance_factor(system.chi_square, dof, least_share_of(pairs));
   solution.covariance = covariance.topLeftCorner<4, 4>();
   if (scale_sigma > 0.0) {
     solution.scale_covariance = covariance.col(4);

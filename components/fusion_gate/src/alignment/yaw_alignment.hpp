@@ -23,6 +23,8 @@ struct AlignmentPair {
   Eigen::Vector3d variance_map_m2{Eigen::Vector3d::Ones()};  ///< of p_map_m, per axis
   Eigen::Vector3d p_odom_m{Eigen::Vector3d::Zero()};
   double distance_m{0.0};  ///< driven when the pair was made
+  /// Of its variance, when the residuals testify that it is smaller: what the receiver itself says.
+  double least_share{1.0};
 };
 
 struct AlignmentSolution {

@@ -19,9 +19,8 @@ struct AcceptedFix {
   bool is_recorded{false};  ///< told of in a record of its own
 };
 
-/// GPS filters double the sigmas that receivers report and add floors, because some receivers are
-/// optimistic. Where LIO testifies that this one is not, a variance may be so much smaller.
-inline constexpr double kFilterMargin = 0.25;
+/// A receiver that says less than this share of the filter's variance is not believed more.
+inline constexpr double kLeastShare = 0.1;
 
 /// Why something is refused: `code` is short, stable and counted, `reason` is the sentence.
 struct Refusal {
