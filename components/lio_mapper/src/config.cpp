@@ -149,11 +149,11 @@ void describe_surfel_map(SurfelMapConfig& c, ConfigFields& f) {
            "middle over largest eigenvalue: a line is no plane",
            {0.0, 1.0});
   f.number("max_residual_m", c.max_residual_m, "farther planes do not explain a point", kPositive);
-  f.flag(
-      "nearest_points",
-      c.nearest_points,
-      "where planes leave the pose open, as in foliage, points without one may match one through the "
-      "five nearest points");
+  f.flag("nearest_points",
+         c.nearest_points,
+         "where planes leave the pose open, as in foliage, points without one may match one "
+         "through the "
+         "five nearest points");
   c.leaf_capacity = static_cast<std::size_t>(capacity);
 }
 
@@ -271,6 +271,17 @@ void describe(Config& config, ConfigFields& fields) {
   fields.section("recovery",
                  "finding the place in the map again after a restart or a lost track",
                  [&](ConfigFields& f) { describe_recovery(config.recovery, f); });
+  fields.section(
+      "past", "correcting what was driven before, beside the odometry", [&](ConfigFields& f) {
+        f.flag("enabled",
+               config.past.enabled,
+               "whether the local map is rebuilt from corrected keyframes after GPS has "
+               "come back and where a place is driven again; needs a session");
+        f.number("interval_s",
+                 config.past.interval_s,
+                 "from one correction to the next at least, data time",
+                 kPositive);
+      });
   fields.number("imu_rate_odometry_hz",
                 config.imu_rate_odometry_hz,
                 "highest rate of lio/odometry_imu_rate",
