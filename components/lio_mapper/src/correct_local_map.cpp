@@ -6,14 +6,13 @@
 #include "local_map.hpp"
 #include "pose_graph_factors.hpp"
 #include "relative_sigma.hpp"
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 namespace trigpoint::lio_mapper {
-
-using Eigen::Vector3d;
 
 namespace {
 
@@ -42,9 +41,25 @@ class Placement {
     return driven_m_[newest_] - driven_m_[keyframe];
   }
 
-  bool is_candidate(std::size_t keyframe) const {
-    return past_.T_map_base[keyframe] &&
-           input_.keyframes[keyframe].odom_epoch == input_.keyframes[newest_].odom_epoch;
+  /// The keyframes whose points the mapper's map holds: the robot has never since been farther from
+  /// them than that reaches. What was forgotten is not brought back: where it has drifted within
+  /// what counts as the same place it would only pull.
+  std::vector<std::size_t> held(double half_side_m) const {
+    std::vector<std::size_t> keyframes;
+    Eigen::AlignedBox2d driven_since;
+    for (std::size_t i = newest_ + 1; i-- > 0;) {
+      if (input_.keyframes[i].odom_epoch != input_.keyframes[newest_].odom_epoch) {
+        break;
+      }
+      const Eigen::Vector2d p = input_.keyframes[i].T_odom_base.p.head<2>();
+      driven_since.extend(p);
+      const Eigen::Vector2d reach = (driven_since.max() - p).cwiseMax(p - driven_since.min());
+      if (past_.T_map_base[i] && reach.maxCoeff() <= half_side_m) {
+        keyframes.push_back(i);
+      }
+    }
+    std::reverse(keyframes.begin(), keyframes.end());
+    return keyframes;
   }
 
   /// The newest one stays, and what lies farther back than the newest stretch is where the graph
@@ -98,30 +113,27 @@ class Placement {
   double sigma_m_{0.0};
 };
 
-void place_clouds(const PastSnapshot& snapshot,
-                  Placement& placement,
-                  const CloudOfKeyframe& cloud_of,
-                  LocalMap& map,
-                  PastReport& report) {
-  const Vector3d center_m = snapshot.input.keyframes.back().T_odom_base.p;
-  for (std::size_t i = 0; i < snapshot.input.keyframes.size(); ++i) {
-    if (!placement.is_candidate(i)) {
-      continue;
-    }
+struct Placed {
+  std::size_t keyframe;
+  Pose T_odom_base;
+};
+
+std::vector<Placed> place_all(const PastSnapshot& snapshot,
+                              Placement& placement,
+                              PastReport& report) {
+  std::vector<Placed> placed;
+  for (const std::size_t i : placement.held(snapshot.local_map.half_side_m)) {
     const Pose T_odom_base = placement.T_odom_base(i);
-    const Vector3d away_m = (T_odom_base.p - center_m).cwiseAbs();
-    if (away_m.head<2>().maxCoeff() > snapshot.local_map.half_side_m) {
-      continue;
-    }
     if (!placement.is_trusted(i, T_odom_base)) {
       ++report.left_out;
       continue;
     }
-    map.insert(moved(cloud_of(i), T_odom_base));
-    ++report.placed;
+    placed.push_back({i, T_odom_base});
     report.largest_move_m = std::max(report.largest_move_m, placement.moved_m(i, T_odom_base));
   }
-  map.prune(center_m, snapshot.local_map.half_side_m);
+  report.placed = placed.size();
+  report.changed = report.left_out > 0 || report.largest_move_m > kStayed_m;
+  return placed;
 }
 
 }  // namespace
@@ -142,7 +154,13 @@ std::optional<CorrectedMap> correct_local_map(PastSnapshot snapshot,
   report.loops = past.loops.size();
   std::unique_ptr<LocalMap> map = make_local_map(snapshot.local_map);
   Placement placement(snapshot, past);
-  place_clouds(snapshot, placement, cloud_of, *map, report);
+  const std::vector<Placed> placed = place_all(snapshot, placement, report);
+  if (report.changed) {
+    for (const Placed& keyframe : placed) {
+      map->insert(moved(cloud_of(keyframe.keyframe), keyframe.T_odom_base));
+    }
+    map->prune(snapshot.input.keyframes.back().T_odom_base.p, snapshot.local_map.half_side_m);
+  }
   const Pose T_odom_frame = placement.T_odom_frame();
   CorrectedMap corrected(std::move(map), std::move(snapshot), std::move(past), T_odom_frame);
   corrected.report = report;

@@ -46,8 +46,10 @@ bool LioMapper::adopt(CorrectedMap& corrected) {
   if (!impl_->past || !impl_->filter || !impl_->past->is_current(corrected.snapshot_)) {
     return false;
   }
-  corrected.insert(impl_->past->take_inserted());
-  impl_->filter->swap_map(corrected.map_);
+  if (corrected.report.changed) {
+    corrected.insert(impl_->past->take_inserted());
+    impl_->filter->swap_map(corrected.map_);
+  }
   impl_->past->conclude(corrected.snapshot_, corrected.past_, corrected.T_odom_frame_);
   return true;
 }

@@ -259,13 +259,14 @@ struct PastBeside::Impl {
     std::snprintf(
         text,
         sizeof text,
-        "%s: %zu keyframes, %zu rows, %zu loops; the local map is made of %zu keyframes "
+        "%s: %zu keyframes, %zu rows, %zu loops; the local map %s %zu keyframes "
         "(%zu left out), moved by at most %.3f m; took %.1f s and %zu scans, held up one by "
         "%.1f ms",
         reason.c_str(),
         r.keyframes,
         r.rows,
         r.loops,
+        r.changed ? "is made anew of" : "stays, it holds",
         r.placed,
         r.left_out,
         r.largest_move_m,
@@ -327,7 +328,8 @@ Events PastBeside::after_scans(std::size_t scans) {
   }
   auto outcome = impl.take_outcome();
   const Clock::time_point before = Clock::now();
-  if (!outcome || (outcome->corrected && impl.catch_up(*outcome))) {
+  if (!outcome ||
+      (outcome->corrected && outcome->corrected->report.changed && impl.catch_up(*outcome))) {
     return {};
   }
   return impl.conclude(std::move(*outcome), before);

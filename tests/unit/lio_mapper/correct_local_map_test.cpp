@@ -169,6 +169,29 @@ TEST(CorrectLocalMap, leaves_out_what_was_moved_by_rows_that_know_no_better) {
   }
 }
 
+TEST(CorrectLocalMap, does_not_build_where_hardly_anything_has_moved) {
+  const TwoPasses& passes = two_passes();
+  PastSnapshot snapshot;
+  snapshot.input = driven_with_drift(passes.truth, 1e-6, Vector3d::Zero());
+  const auto corrected = correct_local_map(snapshot, passes.clouds());
+  ASSERT_TRUE(corrected);
+  EXPECT_GT(corrected->report.loops, 0U);
+  EXPECT_FALSE(corrected->report.changed);
+  EXPECT_TRUE(corrected->map().empty());
+}
+
+// The first pass lies beyond the local map's side for a while: the mapper has forgotten it.
+TEST(CorrectLocalMap, does_not_bring_back_what_was_forgotten) {
+  const TwoPasses& passes = two_passes();
+  PastSnapshot snapshot = passes.snapshot;
+  // The circle's diameter is 38 m, seen along an axis at least 27 m.
+  snapshot.local_map.half_side_m = 20.0;
+  const auto corrected = correct_local_map(snapshot, passes.clouds());
+  ASSERT_TRUE(corrected);
+  EXPECT_GT(corrected->report.loops, 0U);
+  EXPECT_LE(corrected->report.placed + corrected->report.left_out, 61U) << "half a circle";
+}
+
 TEST(CorrectLocalMap, lets_what_the_reader_of_clouds_throws_through) {
   EXPECT_THROW(correct_local_map(two_passes().snapshot,
                                  [](std::size_t) -> PointCloud { throw std::runtime_error("no"); }),

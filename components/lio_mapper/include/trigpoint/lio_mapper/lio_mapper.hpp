@@ -107,7 +107,7 @@ class LioMapper {
   /// The points that have entered the local map since the snapshot or the last call, scan by scan.
   std::vector<PointCloud> take_inserted();
   /// Matches against `corrected` from the next scan on; what take_inserted() would give is inserted
-  /// first. Poses do not change. Afterwards `corrected` holds the old map, to be disposed of
+  /// first. Where nothing has changed the map stays. Poses do not change. Afterwards `corrected` holds the old map, to be disposed of
   /// wherever that disturbs nobody. False, and nothing happens, when it is of another odom epoch or
   /// came too late.
   bool adopt(CorrectedMap& corrected);

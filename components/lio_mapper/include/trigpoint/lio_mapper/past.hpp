@@ -33,8 +33,10 @@ struct PastReport {
   std::size_t keyframes{0};  ///< in the graph
   std::size_t rows{0};
   std::size_t loops{0};
+  /// False: what the local map holds has hardly moved. It was not built anew then.
+  bool changed{true};
   std::size_t placed{0};       ///< keyframes that the local map is made of
-  std::size_t left_out{0};     ///< near enough, but moved by what neither GPS nor a loop backs
+  std::size_t left_out{0};     ///< moved by what neither GPS nor a loop backs
   double largest_move_m{0.0};  ///< of a placed one, in odom
 };
 
@@ -67,9 +69,9 @@ class CorrectedMap {
 };
 
 /// Solves the pose graph of the snapshot (correct_past) and builds the local map around the newest
-/// keyframe from those of its epoch: the newest stretch where odom has it, older visits where they
-/// belong. Reads nothing but its arguments; same bits on every run. Nothing when there is nothing
-/// to build on. What `cloud_of` and `progress` throw goes through.
+/// keyframe from those that the mapper's map holds: the newest stretch where odom has it, older
+/// visits where they belong. Reads nothing but its arguments; same bits on every run. Nothing when
+/// there is nothing to build on. What `cloud_of` and `progress` throw goes through.
 std::optional<CorrectedMap> correct_local_map(PastSnapshot snapshot,
                                               const CloudOfKeyframe& cloud_of,
                                               const std::function<void(double)>& progress = {});
