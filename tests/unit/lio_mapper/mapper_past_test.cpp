@@ -27,7 +27,7 @@ constexpr int kLastSweep = 110;
 /// A drive through the hall; `after_sweep` is called between two inputs.
 class Drive {
  public:
-  explicit Drive(const Config& config = {}) : mapper(config, RobotConfig{}) {
+  explicit Drive(bool corrected = true) : mapper(config(corrected), RobotConfig{}) {
     mapper.keep_past({});
   }
 
@@ -64,6 +64,12 @@ class Drive {
       map->insert(moved(keyframe.points_base, keyframe.T_odom_base));
     }
     return {std::move(map), std::move(snapshot), CorrectedPast{}, Pose{}};
+  }
+
+  static Config config(bool corrected) {
+    Config config;
+    config.past.enabled = corrected;
+    return config;
   }
 
   LioMapper mapper;
@@ -224,9 +230,7 @@ TEST(MapperPast, adopts_a_correction_once_and_none_that_was_given_up) {
 }
 
 TEST(MapperPast, is_not_kept_when_it_is_switched_off) {
-  Config config;
-  config.past.enabled = false;
-  Drive drive(config);
+  Drive drive(false);
   drive.run();
   EXPECT_FALSE(drive.mapper.past_is_due());
   EXPECT_TRUE(drive.mapper.take_inserted().empty());

@@ -97,6 +97,7 @@ class Drive {
  private:
   static lio_mapper::Config config() {
     lio_mapper::Config config;
+    config.past.enabled = true;
     config.past.interval_s = 5.0;
     return config;
   }

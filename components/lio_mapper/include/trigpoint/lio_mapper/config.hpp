@@ -129,7 +129,7 @@ struct RecoveryConfig {
 
 /// Correcting the past while driving (README, "The past").
 struct PastConfig {
-  bool enabled{true};
+  bool enabled{false};
   double interval_s{30.0};  ///< at least, from one correction to the next
 };
 
