@@ -9,6 +9,7 @@
 #include "trigpoint/bus/loop.hpp"
 #include "trigpoint/bus/topics.hpp"
 #include "trigpoint/lio_mapper/lio_mapper.hpp"
+#include "trigpoint/pipeline/past_beside.hpp"
 #include "trigpoint/pipeline/session_parts.hpp"
 #include "trigpoint/shell/shell.hpp"
 
@@ -28,6 +29,9 @@ using Clock = std::chrono::steady_clock;
 constexpr std::size_t kDecodedClouds = 60;
 /// Scans between matching and disk, ten seconds: then odometry waits for the disk.
 constexpr std::size_t kUnwrittenScans = 100;
+
+/// The correction of the past takes what the odometry leaves.
+constexpr int kPastNiceness = 10;
 
 constexpr std::chrono::seconds kMapPeriod{5};  ///< the latched local map, while somebody listens
 
@@ -61,7 +65,8 @@ bus::DiagnosticLevel level_of(LioHealth health) {
 
 /// Publishes what the core says. On the loop's thread, except: conversions (the bus's threads),
 /// decoding (a thread of its own; the loop takes each cloud in its turn among the IMU samples as
-/// they arrived) and the session's files (another one, in order).
+/// they arrived), the session's files (another one, in order) and the correction of the past (a
+/// third one, of low priority).
 class Process {
  public:
   Process(const Settings& settings,
@@ -84,6 +89,8 @@ class Process {
     if (!options.session.empty()) {
       exporter::create_session_folder(options.session);
       open_session(options.session);
+    } else if (settings.mapper.past.enabled) {
+      log_.info("no session, so no keyframes: the past is not corrected");
     }
     publish_extrinsics(settings.robot);
     updates_.emplace(
@@ -114,12 +121,16 @@ class Process {
 
   /// Wakes a thread of the bus that waits to hand a cloud over: it is joined below.
   ~Process() { decoding_.stop(); }
+
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
   /// After the loop: what still waits for IMU samples is processed, and everything is written.
   void close() {
     decoding_.stop();
+    if (past_) {
+      past_->cancel();
+    }
     take([this] { return core_.finish(); });
     keep(
         [this, status = core_.status(), checkpoint = core_.checkpoint(), rows = core_.take_rows()] {
@@ -144,6 +155,12 @@ class Process {
       log_.info("going on with the session in " + session);
     }
     session_.emplace(session, goes_on ? pipeline::Continuing::kYes : pipeline::Continuing::kNo);
+    past_.emplace(
+        core_,
+        exporter::path_in(session, exporter::session_file::kKeyframes),
+        goes_on ? pipeline::stored_past(session) : lio_mapper::GraphInput{},
+        [this](SerialWorker::Job job) { keep(std::move(job)); },
+        pipeline::PastBesideOptions{std::nullopt, kPastNiceness});
   }
 
   void take_cloud() {
@@ -171,6 +188,9 @@ class Process {
     }
     if (output.odometry_imu_rate) {
       imu_rate_.publish(bus::to_message(*output.odometry_imu_rate));
+    }
+    if (past_) {
+      log_(past_->after_scans(output.scans.size()));
     }
   }
 
@@ -218,13 +238,15 @@ class Process {
       publish_status(status);
     }
     reported_scans_ = status.scans_used;
-    const bus::Diagnostic line{level_of(status.health),
-                               "lio_mapper: scans",
-                               "used " + std::to_string(status.scans_used) + " of " +
-                                   std::to_string(status.scans_received),
-                               "",
-                               {{"imu samples", std::to_string(status.imu_received)},
-                                {"odom epoch", std::to_string(status.odom_epoch)}}};
+    const bus::Diagnostic line{
+        level_of(status.health),
+        "lio_mapper: scans",
+        "used " + std::to_string(status.scans_used) + " of " +
+            std::to_string(status.scans_received),
+        "",
+        {{"imu samples", std::to_string(status.imu_received)},
+         {"odom epoch", std::to_string(status.odom_epoch)},
+         {"corrections of the past", std::to_string(past_ ? past_->corrections() : 0)}}};
     diagnostics_.publish(bus::to_message(status.stamp_ns, {&line, 1}));
   }
 
@@ -263,7 +285,8 @@ class Process {
   std::optional<bus::Subscription<trigpoint_msgs::msg::StateUpdate>> updates_;
   std::optional<bus::Subscription<sensor_msgs::msg::Imu>> imu_;
   std::optional<bus::Subscription<sensor_msgs::msg::PointCloud2>> points_;
-  SerialWorker writing_{kUnwrittenScans};
+  std::optional<pipeline::PastBeside> past_;
+  SerialWorker writing_{kUnwrittenScans};  ///< last: its jobs use the others
 };
 
 int run(const shell::Options& options, const shell::EventLog& log) {

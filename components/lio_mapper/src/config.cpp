@@ -276,6 +276,18 @@ void describe(Config& config, ConfigFields& fields) {
   fields.section("recovery",
                  "finding the place in the map again after a restart or a lost track",
                  [&](ConfigFields& f) { describe_recovery(config.recovery, f); });
+  fields.section(
+      "past", "correcting what was driven before, beside the odometry", [&](ConfigFields& f) {
+        f.flag("enabled",
+               config.past.enabled,
+               "whether the local map is rebuilt from corrected keyframes after GPS has "
+               "come back and where a place is driven again; needs a session. Takes double "
+               "walls away; may cost the place in map a centimetre");
+        f.number("interval_s",
+                 config.past.interval_s,
+                 "from one correction to the next at least, data time",
+                 kPositive);
+      });
   fields.number("imu_rate_odometry_hz",
                 config.imu_rate_odometry_hz,
                 "highest rate of lio/odometry_imu_rate",

@@ -293,6 +293,7 @@ void LioMapper::Impl::report(const ScanOutcome& outcome, Output& output) {
       keyframe_trigger.fires(filter->stamp_ns(), state.T_odom_base)) {
     result.keyframe = make_keyframe(outcome, result.odometry);
   }
+  remember(result);
   result.checkpoint = checkpoint_of(*filter, status, next_keyframe);
   result.rows = std::exchange(rows_decided, {});
   output.scans.push_back(std::move(result));
@@ -324,6 +325,9 @@ void LioMapper::Impl::count_row(const StateUpdate& update,
     rows_decided.push_back(
         {update, status.odom_epoch, applied, applied ? "applied" : verdict.reason});
     rows_decided.back().update.first_alignment.reset();
+    if (past) {
+      past->on_row(rows_decided.back(), filter->state().placement(), filter->state().T_odom_base.p);
+    }
   }
   if (verdict.outcome == RowOutcome::kApplied) {
     ++status.rows_applied;

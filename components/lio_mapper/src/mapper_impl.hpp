@@ -11,6 +11,7 @@
 #include "imu_rate_odometry.hpp"
 #include "keyframe_trigger.hpp"
 #include "lost_track.hpp"
+#include "past_record.hpp"
 #include "resumption.hpp"
 #include "scan_filter.hpp"
 #include "start_up.hpp"
@@ -24,7 +25,7 @@
 namespace trigpoint::lio_mapper {
 
 /// lio_mapper.cpp has the way of a sweep, mapper_recovery.cpp what happens at restarts and lost
-/// tracks.
+/// tracks, mapper_past.cpp what the correction of the past needs.
 struct LioMapper::Impl {
   /// `checked` contradicts itself nowhere.
   Impl(const Config& checked, const RobotConfig& robot)
@@ -64,6 +65,7 @@ struct LioMapper::Impl {
   void judge_absence(Nanoseconds stamp_ns, Output& output);
   void report(const ScanOutcome& outcome, Output& output);
   Keyframe make_keyframe(const ScanOutcome& outcome, const Odometry& odometry);
+  void remember(const ScanResult& result);
   void refresh_status();
 
   Config config;
@@ -72,6 +74,7 @@ struct LioMapper::Impl {
   ImuIntake intake;
   ImuBuffer imu;
   std::deque<Sweep> sweeps;
+  std::optional<PastRecord> past;  ///< when it is kept
   std::optional<ScanFilter> filter;
   ImuRateOdometry imu_rate;
   CalibrationReport calibration_report;

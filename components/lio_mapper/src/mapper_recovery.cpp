@@ -23,6 +23,9 @@ void LioMapper::Impl::begin_epoch_anew(const std::string& code,
   lost_track.forget();
   keyframe_trigger = KeyframeTrigger(config.keyframes);
   imu_rate = ImuRateOdometry(config.imu, config.imu_rate_odometry_hz);
+  if (past) {
+    past->on_new_epoch();
+  }
   ++status.odom_epoch;
   ++status.reset.counter;
   status.reset.delta = {};
@@ -58,7 +61,10 @@ bool LioMapper::Impl::resume_from(const StartResult& result, Output& output) {
 /// A frozen map is loaded around the robot as that moves.
 void LioMapper::Impl::update_map(const ScanOutcome& outcome) {
   if (!stored_points) {
-    filter->insert(outcome);
+    PointCloud inserted = filter->insert(outcome);
+    if (past) {
+      past->on_inserted(std::move(inserted));
+    }
     return;
   }
   const Eigen::Vector3d& p = filter->state().T_odom_base.p;

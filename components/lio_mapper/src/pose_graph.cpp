@@ -98,6 +98,7 @@ class Correction {
     CorrectedPast past;
     past.frame = places_.frame;
     past.loops = loops_;
+    past.registered = search_.found();
     report_.loops = loops_.size();
     report_.loops_refused = search_.refused();
     if (outvoted_ > 0) {

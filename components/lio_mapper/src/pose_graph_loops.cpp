@@ -47,7 +47,12 @@ LoopSearch::LoopSearch(const GraphInput& input,
       cloud_of_(cloud_of),
       options_(options),
       places_(places),
-      driven_m_(driven_of(input)) {}
+      driven_m_(driven_of(input)),
+      loops_(options.known_loops) {
+  for (const Loop& loop : loops_) {
+    registered_.insert({loop.earlier, loop.later});
+  }
+}
 
 /// Of every earlier visit the nearest keyframe, nearest visits first.
 std::vector<std::size_t> LoopSearch::visits_near(std::size_t from,
@@ -94,6 +99,9 @@ std::vector<LoopSearch::Pair> LoopSearch::pairs_near(const std::vector<Pose>& no
       continue;
     }
     newest_m = driven_m_[from];
+    if (from < options_.search_from) {
+      continue;
+    }
     for (const std::size_t visit : visits_near(from, nodes)) {
       // The first keyframe of its stretch of some metres stands for the others.
       std::size_t to = visit;

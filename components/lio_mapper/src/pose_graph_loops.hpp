@@ -32,6 +32,9 @@ class LoopSearch {
   /// fewer than contradict them.
   std::vector<Loop> consistent() const;
 
+  /// All that were registered.
+  const std::vector<Loop>& found() const { return loops_; }
+
   /// By reason, of the pairs looked at and found wanting.
   std::vector<NamedCount> refused() const;
 

@@ -360,12 +360,13 @@ ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu, const 
   return outcome;
 }
 
-void ScanFilter::insert(const ScanOutcome& outcome) {
+PointCloud ScanFilter::insert(const ScanOutcome& outcome) {
   begin(Stage::kInsert);
   const Vector3d& p = state().T_odom_base.p;
   const double sigma2 = covariance().diagonal().head<3>().maxCoeff();
+  PointCloud points_odom;
   if (outcome.used || sigma2 < kMapSigma_m * kMapSigma_m) {
-    const PointCloud points_odom = transformed(outcome.thinned_base, state().T_odom_base);
+    points_odom = transformed(outcome.thinned_base, state().T_odom_base);
     map_->insert(points_odom);
     if (config_.extrinsic.estimate) {
       origins_.insert(points_odom, state().T_odom_base, state().T_base_lidar);
@@ -376,6 +377,7 @@ void ScanFilter::insert(const ScanOutcome& outcome) {
     origins_.prune(p, config_.local_map.half_side_m);
     pruned_at_m_ = p;
   }
+  return points_odom;
 }
 
 Calibration ScanFilter::calibration() const {

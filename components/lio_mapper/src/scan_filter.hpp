@@ -96,6 +96,9 @@ class ScanFilter {
   /// Another one of the same place.
   void replace_map(std::unique_ptr<LocalMap> map) { map_ = std::move(map); }
 
+  /// The same; the caller has the old one to dispose of.
+  void swap_map(std::unique_ptr<LocalMap>& map) { map_.swap(map); }
+
   Workers& workers() { return *workers_; }
 
   const Matrix6d& drift_covariance() const { return drift_covariance_; }
@@ -118,8 +121,8 @@ class ScanFilter {
   Matrix6d placement_covariance() const;
 
   /// Called once between process() and the next process(): rows that wait count before the scan
-  /// enters the map.
-  void insert(const ScanOutcome& outcome);
+  /// enters the map. Gives what has entered it, in odom.
+  PointCloud insert(const ScanOutcome& outcome);
 
  private:
   struct Prediction {

@@ -137,6 +137,10 @@ Step Lockstep::finish() {
   return step;
 }
 
+lio_mapper::LioMapper& Lockstep::mapper() {
+  return impl_->mapper;
+}
+
 std::optional<Datum> Lockstep::datum() const {
   return impl_->gps.datum();
 }

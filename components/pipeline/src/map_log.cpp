@@ -4,6 +4,7 @@
 
 #include "trigpoint/base/serial_worker.hpp"
 #include "trigpoint/export/session.hpp"
+#include "trigpoint/pipeline/past_beside.hpp"
 #include "trigpoint/pipeline/session_parts.hpp"
 
 #include "read_ahead.hpp"
@@ -21,6 +22,8 @@ using Clock = std::chrono::steady_clock;
 
 /// A minute of the gate's output, ten seconds of scans at most.
 constexpr std::size_t kUnwrittenSteps = 256;
+/// Five seconds at 10 Hz from a snapshot of the past to its correction, however long that takes.
+constexpr std::uint64_t kAdoptAfterScans = 50;
 
 double milliseconds_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
@@ -43,6 +46,19 @@ class Session {
         gate_(folder, opening_for(use)),
         log_(folder, opening_for(use)) {}
 
+  /// Before the first step. What is stored may already be there.
+  void correct_past_of(Lockstep& cores, UseOfStored use) {
+    past_.emplace(
+        cores.mapper(),
+        path(file::kKeyframes),
+        use == UseOfStored::kResume ? stored_past(folder_) : lio_mapper::GraphInput{},
+        [this](SerialWorker::Job job) { disk_.give(std::move(job)); },
+        PastBesideOptions{kAdoptAfterScans, 0});
+  }
+
+  /// Between two steps; `scans` have just been handed to on_step().
+  Events after_scans(std::size_t scans) { return past_->after_scans(scans); }
+
   void on_entry(const recording::LogEntry& entry) { log_.on_entry(entry); }
 
   /// Returns at once unless the disk lags far behind; throws when it has refused something.
@@ -62,6 +78,7 @@ class Session {
   }
 
   void close(Lockstep& cores, const recording::LogReader& log) {
+    past_->cancel();
     keep_datum(cores);
     keep_alignment(cores);
     disk_.finish();
@@ -118,7 +135,8 @@ class Session {
   GpsPart gps_;
   MapperPart mapper_;
   GatePart gate_;
-  LogPart log_;                         ///< written by the caller's thread
+  LogPart log_;  ///< written by the caller's thread
+  std::optional<PastBeside> past_;
   SerialWorker disk_{kUnwrittenSteps};  ///< last: its jobs use the others
 };
 
@@ -146,6 +164,7 @@ MapLogResult map_log(recording::LogReader& log,
   }
   exporter::create_session_folder(options.session);
   Session session(options.session, options.use);
+  session.correct_past_of(cores, options.use);
   exporter::write_text(session.path(file::kConfig), options.config_text);
   session.keep_truth(log);
   const Clock::time_point start = Clock::now();
@@ -167,7 +186,9 @@ MapLogResult map_log(recording::LogReader& log,
     Step step = advance();
     const double step_ms = milliseconds_since(before);
     tell(step.events, options);
+    const std::size_t scans = step.scans.size();
     session.on_step(std::move(step), cores, step_ms);
+    tell(session.after_scans(scans), options);
   };
   tell(recording::fault_events(log.summary()), options);
   ReadAhead ahead(log, configs.lio_mapper);

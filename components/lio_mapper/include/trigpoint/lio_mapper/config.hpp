@@ -129,6 +129,12 @@ struct RecoveryConfig {
   double give_up_s{10.0};    ///< of a lost track with usable sweeps, until odom begins anew
 };
 
+/// Correcting the past while driving (README, "The past").
+struct PastConfig {
+  bool enabled{false};
+  double interval_s{30.0};  ///< at least, from one correction to the next
+};
+
 /// The only defaults of lio_mapper; units and rules are in src/config.cpp.
 struct Config {
   SweepTimingConfig sweep;
@@ -141,6 +147,7 @@ struct Config {
   RowsConfig rows;
   KeyframeConfig keyframes;
   RecoveryConfig recovery;
+  PastConfig past;
   double imu_rate_odometry_hz{100.0};
 };
 

@@ -31,6 +31,10 @@ struct Keyframe {
   PointCloud points_base;
 };
 
+class CorrectedMap;
+struct GraphInput;
+struct PastSnapshot;
+
 /// One sweep that went through the filter.
 struct ScanResult {
   Odometry odometry;  ///< base_link in odom at the sweep's last point
@@ -91,6 +95,24 @@ class LioMapper {
   /// checkpoint (event `lio_resumed`); when that fails odom begins anew with the next epoch
   /// (`lio_not_resumed`). `points` is called from inputs; what it throws goes through.
   void resume(const Checkpoint& checkpoint, StoredPoints points, const ResumeOptions& options = {});
+
+  /// From now on remembers poses, rows and odom for corrections of the past (`past.hpp`; README,
+  /// "The past"); `earlier` is what a session that goes on holds of them. Before the first input.
+  void keep_past(const GraphInput& earlier);
+  /// Why the past should be corrected now; nothing when there is no reason to.
+  std::optional<std::string> past_is_due() const;
+  /// A copy of what is remembered. From here on what enters the local map is kept as well, until
+  /// adopt() or forget_snapshot(). Not before past_is_due().
+  PastSnapshot past_snapshot();
+  /// The points that have entered the local map since the snapshot or the last call, scan by scan.
+  std::vector<PointCloud> take_inserted();
+  /// Matches against `corrected` from the next scan on; what take_inserted() would give is inserted
+  /// first. Where nothing has changed the map stays. Poses do not change. Afterwards `corrected` holds the old map, to be disposed of
+  /// wherever that disturbs nobody. False, and nothing happens, when it is of another odom epoch or
+  /// came too late.
+  bool adopt(CorrectedMap& corrected);
+  /// Nothing came of it.
+  void forget_snapshot();
 
   /// What a restart needs; nothing before the first scan.
   std::optional<Checkpoint> checkpoint() const;

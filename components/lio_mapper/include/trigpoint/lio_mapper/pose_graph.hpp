@@ -63,9 +63,15 @@ OnlinePlaces place_online(const GraphInput& input);
 /// The cloud of keyframe `index` of the input, in base. May throw; that goes through.
 using CloudOfKeyframe = std::function<PointCloud(std::size_t index)>;
 
+struct Loop;
+
 struct PoseGraphOptions {
   // Loop closures.
   bool loops{true};
+  /// Registered before, among the same keyframes: taken as found. Keyframes before `search_from`
+  /// look for no other.
+  std::vector<Loop> known_loops;
+  std::size_t search_from{0};
   double loop_every_m{4.0};      ///< driven, between keyframes that look for one
   double loop_radius_m{10.0};    ///< in xy, of the present estimate
   double loop_apart_m{60.0};     ///< driven between its ends
@@ -111,6 +117,7 @@ struct CorrectedPast {
   std::string frame{"map"};                     ///< "odom" when nothing was ever aligned
   std::vector<std::optional<Pose>> T_map_base;  ///< of every keyframe; nothing: left out
   std::vector<Loop> loops;                      ///< that took part
+  std::vector<Loop> registered;                 ///< all that were found, also earlier
   PoseGraphReport report;
 };
 

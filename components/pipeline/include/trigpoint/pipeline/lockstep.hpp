@@ -59,6 +59,9 @@ class Lockstep {
   /// End of the log: what still waits in the mapper.
   Step finish();
 
+  /// For who corrects its past between two steps.
+  lio_mapper::LioMapper& mapper();
+
   std::optional<Datum> datum() const;
   std::optional<Alignment> best_alignment() const;
   GpsStatus gps_status() const;
