@@ -191,6 +191,7 @@ std::vector<Sample> run_child(const Options& options, const std::string& program
   }
   close(ends[1]);
   std::vector<Sample> samples;
+  bool killed = false;
   FILE* lines = fdopen(ends[0], "r");
   Sample sample;
   while (std::fscanf(lines, "%lf %lf", &sample.time_s, &sample.memory_mb) == 2) {
@@ -199,6 +200,7 @@ std::vector<Sample> run_child(const Options& options, const std::string& program
     samples.push_back(sample);
     if (kill_s > 0.0 && sample.time_s >= kill_s) {
       kill(child, SIGKILL);
+      killed = true;
       std::printf("killed\n");
       break;
     }
@@ -206,8 +208,11 @@ std::vector<Sample> run_child(const Options& options, const std::string& program
   std::fclose(lines);
   int status = 0;
   waitpid(child, &status, 0);
-  if (kill_s <= 0.0 && (!WIFEXITED(status) || WEXITSTATUS(status) != 0)) {
+  if (!killed && (!WIFEXITED(status) || WEXITSTATUS(status) != 0)) {
     throw std::runtime_error("the drive failed");
+  }
+  if (kill_s > 0.0 && !killed) {
+    throw std::runtime_error("the drive ended before it was to be killed");
   }
   return samples;
 }

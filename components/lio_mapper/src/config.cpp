@@ -149,11 +149,11 @@ void describe_surfel_map(SurfelMapConfig& c, ConfigFields& f) {
            "middle over largest eigenvalue: a line is no plane",
            {0.0, 1.0});
   f.number("max_residual_m", c.max_residual_m, "farther planes do not explain a point", kPositive);
-  f.flag(
-      "nearest_points",
-      c.nearest_points,
-      "where planes leave the pose open, as in foliage, points without one may match one through the "
-      "five nearest points");
+  f.flag("nearest_points",
+         c.nearest_points,
+         "where planes leave the pose open, as in foliage, points without one may match one "
+         "through the "
+         "five nearest points");
   c.leaf_capacity = static_cast<std::size_t>(capacity);
 }
 

@@ -264,13 +264,21 @@ std::optional<Checkpoint> KeyframeReader::checkpoint() {
 }
 
 CloudSizes KeyframeReader::cloud_sizes() {
-  Statement clouds(impl_->database, "SELECT points_base FROM keyframes");
+  Statement clouds(impl_->database, "SELECT points_base, id FROM keyframes");
   CloudSizes sizes;
   while (clouds.step()) {
     ++sizes.keyframes;
     sizes.bytes += clouds.size(0);
-    sizes.points += impl_->has_all() ? packed_count(clouds.blob(0), clouds.size(0))
-                                     : clouds.size(0) / sizeof(PointXyzi);
+    if (!impl_->has_all()) {
+      sizes.points += clouds.size(0) / sizeof(PointXyzi);
+      continue;
+    }
+    try {
+      sizes.points += packed_count(clouds.blob(0), clouds.size(0));
+    } catch (const std::exception& error) {
+      clouds.fail("points_base of keyframe " + std::to_string(clouds.integer(1)) + ": " +
+                  error.what());
+    }
   }
   return sizes;
 }

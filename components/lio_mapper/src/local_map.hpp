@@ -29,14 +29,17 @@ class LocalMap {
   /// The plane that explains `point_odom_m`, or false where none holds. Safe to call from several
   /// threads at once between two changes of the map.
   virtual bool match(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) const = 0;
+
   /// The first and cheap part of `match`, and the dear part for points that it leaves without a
   /// plane.
   virtual bool match_surface(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) const {
     return match(point_odom_m, plane);
   }
+
   virtual bool match_nearest(const Eigen::Vector3d& /*point_odom_m*/, PlaneMatch& /*plane*/) const {
     return false;
   }
+
   virtual void insert(const PointCloud& points_odom) = 0;
   /// Forgets what lies outside the axis-aligned cube around `center_odom_m`.
   virtual void prune(const Eigen::Vector3d& center_odom_m, double half_side_m) = 0;

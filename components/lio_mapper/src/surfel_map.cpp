@@ -101,9 +101,9 @@ void SurfelMap::insert_mean(const PointXyzi& point, std::uint16_t count) {
   }
   const bool first = leaf.count == 0;
   leaf_count_ += first ? 1 : 0;
-  leaf.count = static_cast<std::uint16_t>(
-      std::min<std::size_t>(leaf.count + std::size_t{count}, config_.leaf_capacity));
-  const double share = static_cast<double>(std::min(count, leaf.count)) / leaf.count;
+  const std::size_t together = leaf.count + std::size_t{count};
+  const double share = static_cast<double>(count) / static_cast<double>(together);
+  leaf.count = static_cast<std::uint16_t>(std::min(together, config_.leaf_capacity));
   const Eigen::Vector3d local_m = point_odom_m - centre_of(home);
   const Eigen::Vector3d mean_m = metres(leaf.mean);
   leaf.mean = offset_of(mean_m + share * (local_m - mean_m));

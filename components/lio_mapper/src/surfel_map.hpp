@@ -40,7 +40,7 @@ class SurfelMap final : public LocalMap {
   bool match_nearest(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) const override;
   void insert(const PointCloud& points_odom) override;
   void prune(const Eigen::Vector3d& center_odom_m, double half_side_m) override;
-  /// Leaf means keep their weights; leaves are laid anew.
+  /// Leaf means keep their weights; leaves are laid anew, the means as their single points.
   void transform(const Pose& T_new_old) override;
   void rebuild(const PointCloud& points_odom) override;
   /// The means of the leaves, in the order of their parents' creation.

@@ -130,9 +130,9 @@ bool SurfelMap::match_surface(const Eigen::Vector3d& point_odom_m, PlaneMatch& m
       match.offset_m = -normal.dot(centroid);
       match.thickness2_m2 = static_cast<double>(plane->thickness2_m2);
       match.tilt2_rad2 = static_cast<double>(plane->tilt2_rad2);
-    }
-    if (i == 0 && std::abs(residual) < kOnPlane_m) {
-      return true;  // surely its own surface: no other has to be looked for
+      if (i == 0 && std::abs(residual) < kOnPlane_m) {
+        return true;  // surely its own surface: no other has to be looked for
+      }
     }
   }
   return std::isfinite(least_cost);

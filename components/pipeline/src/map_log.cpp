@@ -20,7 +20,7 @@ namespace {
 namespace file = exporter::session_file;
 using Clock = std::chrono::steady_clock;
 
-/// A minute of the gate's output, ten seconds of scans at most.
+/// Two and a half seconds of IMU samples, with the scans and fixes between them.
 constexpr std::size_t kUnwrittenSteps = 256;
 /// Five seconds at 10 Hz from a snapshot of the past to its correction, however long that takes.
 constexpr std::uint64_t kAdoptAfterScans = 50;
@@ -208,7 +208,9 @@ MapLogResult map_log(recording::LogReader& log,
     }
   }
   ahead.stop();
-  result.log_error = ahead.error();
+  if (!result.stopped) {
+    result.log_error = ahead.error();  // else perhaps of what this run never reached
+  }
   run([&] { return cores.finish(); });
   tell(log.take_events(), options);
   tell(recording::undecodable_events(log), options);

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// What the matcher asks of a local map, and when.
+#include "scan_matcher.hpp"
+
+#include "trigpoint/base/so3.hpp"
+
+#include <Eigen/Cholesky>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <utility>
+
+namespace trigpoint::lio_mapper {
+namespace {
+
+/// A room 8 m wide; walls of x are there only when `ends` is set: else it is a tunnel.
+class Room final : public LocalMap {
+ public:
+  explicit Room(bool ends) : ends_(ends) {}
+
+  bool match(const Eigen::Vector3d& p, PlaneMatch& plane) const override {
+    return match_surface(p, plane) || match_nearest(p, plane);
+  }
+
+  bool match_surface(const Eigen::Vector3d& p, PlaneMatch& plane) const override {
+    ++surfaces_asked;
+    Eigen::Index axis = 0;
+    const double distance_m = p.cwiseAbs().maxCoeff(&axis);
+    if (distance_m < 3.0 || (axis == 0 && !ends_)) {
+      return false;
+    }
+    plane.normal = Eigen::Vector3d::Unit(axis);
+    plane.offset_m = p[axis] < 0.0 ? 4.0 : -4.0;
+    plane.thickness2_m2 = 1e-4;
+    plane.tilt2_rad2 = 0.0;
+    return true;
+  }
+
+  bool match_nearest(const Eigen::Vector3d& /*p*/, PlaneMatch& /*plane*/) const override {
+    ++nearest_asked;
+    return false;
+  }
+
+  void insert(const PointCloud& /*points_odom*/) override {}
+
+  void prune(const Eigen::Vector3d& /*center_odom_m*/, double /*half_side_m*/) override {}
+
+  void transform(const Pose& /*T_new_old*/) override {}
+
+  void rebuild(const PointCloud& /*points_odom*/) override {}
+
+  PointCloud points() const override { return {}; }
+
+  std::size_t size() const override { return 1; }
+
+  std::size_t memory_bytes() const override { return 0; }
+
+  mutable std::atomic<int> surfaces_asked{0};
+  mutable std::atomic<int> nearest_asked{0};
+
+ private:
+  bool ends_;
+};
+
+constexpr int kAWall = 100;
+constexpr int kPoints = 6 * kAWall;
+
+PointCloud room_points() {
+  PointCloud points;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const float side : {-4.0F, 4.0F}) {
+      for (int i = 0; i < kAWall; ++i) {
+        Eigen::Vector3f p(
+            0.6F * static_cast<float>(i % 10 - 5), 0.6F * static_cast<float>(i / 10 - 5), side);
+        std::swap(p[axis], p[2]);
+        points.push_back({p.x(), p.y(), p.z(), 0.0F});
+      }
+    }
+  }
+  return points;
+}
+
+struct Matching {
+  explicit Matching(bool ends) : room(ends) {}
+
+  Room room;
+  PointCloud points{room_points()};
+  MatchingConfig config;
+  Workers workers{2};
+  ScanMatcher matcher{points, room, Pose{}, config, workers};
+};
+
+TEST(ScanMatcher, asks_no_nearest_points_where_surfaces_hold_the_pose) {
+  Matching m(true);
+  const PoseInformation sum = m.matcher.linearise(Pose{});
+  EXPECT_EQ(m.room.surfaces_asked, kPoints);
+  EXPECT_EQ(m.room.nearest_asked, 0);
+  EXPECT_EQ(sum.count, static_cast<std::size_t>(kPoints));
+}
+
+TEST(ScanMatcher,
+     asks_nearest_points_once_for_each_point_without_a_surface_where_the_pose_is_open) {
+  Matching m(false);
+  const PoseInformation sum = m.matcher.linearise(Pose{});
+  EXPECT_EQ(m.room.surfaces_asked, kPoints);
+  EXPECT_EQ(m.room.nearest_asked, 2 * kAWall);
+  EXPECT_EQ(sum.count, static_cast<std::size_t>(4 * kAWall));
+  m.matcher.linearise(Pose{});
+  EXPECT_EQ(m.room.surfaces_asked, kPoints);
+  EXPECT_EQ(m.room.nearest_asked, 2 * kAWall);
+}
+
+TEST(ScanMatcher, looks_up_again_only_the_points_that_moved_by_five_centimetres) {
+  Matching m(true);
+  m.matcher.linearise(Pose{});
+  m.matcher.linearise(Pose(Eigen::Quaterniond::Identity(), {0.04, 0.0, 0.0}));
+  EXPECT_EQ(m.room.surfaces_asked, kPoints);
+  // From where they were looked up, not from the pose before.
+  m.matcher.linearise(Pose(Eigen::Quaterniond::Identity(), {0.06, 0.0, 0.0}));
+  EXPECT_EQ(m.room.surfaces_asked, 2 * kPoints);
+  // A turn moves the far points of the room and not those near its axis.
+  Matching turned(true);
+  turned.matcher.linearise(Pose{});
+  constexpr double kTurn_rad = 0.0125;  // 5 cm at 4 m
+  turned.matcher.linearise(Pose(from_yaw(kTurn_rad), Eigen::Vector3d::Zero()));
+  int moved = 0;
+  for (const PointXyzi& p : turned.points) {
+    moved += 2.0 * std::sin(0.5 * kTurn_rad) * std::hypot(p.x, p.y) >= 0.05 ? 1 : 0;
+  }
+  EXPECT_EQ(turned.room.surfaces_asked, kPoints + moved);
+  EXPECT_GT(moved, kPoints / 4);
+  EXPECT_LT(moved, 3 * kPoints / 4);
+}
+
+TEST(ScanMatcher, a_residual_that_is_not_looked_up_again_is_of_the_present_pose) {
+  Matching m(true);
+  m.matcher.linearise(Pose{});
+  const PoseInformation sum =
+      m.matcher.linearise(Pose(Eigen::Quaterniond::Identity(), {0.03, 0.0, 0.0}));
+  // All residuals along x are 3 cm: the information's own solution leads back.
+  const Vector6d step = sum.information.ldlt().solve(sum.gradient);
+  EXPECT_NEAR(step[0], 0.03, 1e-6);
+  EXPECT_NEAR(step.tail<5>().norm(), 0.0, 1e-6);
+}
+
+}  // namespace
+}  // namespace trigpoint::lio_mapper
