@@ -37,7 +37,7 @@ inline std::vector<Eigen::Vector3d> random_points(int count, double half_side_m,
 /// The same point moved out of the bands near the faces of leaves, where a point may be given to
 /// the leaf behind the face: for tests that compute leaves by themselves.
 inline Eigen::Vector3d away_from_faces(const Eigen::Vector3d& p) {
-  inline constexpr double kBand = 0.101;
+  constexpr double kBand = 0.101;
   const auto moved = [](double v) {
     const double cell = std::floor(v / kLeaf_m);
     return kLeaf_m * (cell + kBand + (1.0 - 2.0 * kBand) * (v / kLeaf_m - cell));
