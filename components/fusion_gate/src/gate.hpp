@@ -118,6 +118,7 @@ struct FusionGate::Impl {
   AlignmentWindow window;
   FixQueue queue;  // told of, waiting for earlier fixes and for LIO to cover their stamps
   std::optional<Nanoseconds> alignment_sent_ns;  // and the mapper has not said that it has it
+  bool alignment_not_taken{false};               // the mapper was waited for, in vain
   std::map<std::string, ForeignSource> foreign_sources;
   std::optional<geodesy::LocalFrame> frame;
   std::optional<LioStatus> lio;

@@ -11,7 +11,7 @@ namespace trigpoint::fusion_gate {
 namespace {
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
-constexpr double kRepeatAlignment_s = 0.5;  // a mapper has it with its next scan
+constexpr double kAlignmentWait_s = 0.5;  // a mapper has it with its next scan
 
 }  // namespace
 
@@ -37,13 +37,18 @@ void FusionGate::Impl::judge_waiting(Output& out) {
   }
 }
 
-/// An alignment is on its way: what comes next is to be held against it.
+/// An alignment is on its way: what comes next is to be held against it. Once in an epoch: a mapper
+/// that did not take the first one may never take any, and fixes must not pile up behind it.
 bool FusionGate::Impl::is_mapper_awaited(Output& out) {
   if (aligned()) {
     alignment_sent_ns.reset();
     return is_replacement_awaited(out);
   }
-  return alignment_sent_ns && to_seconds(now_ns - *alignment_sent_ns) < kRepeatAlignment_s;
+  if (!lio || alignment_not_taken || !alignment_sent_ns) {
+    return false;
+  }
+  alignment_not_taken = to_seconds(now_ns - *alignment_sent_ns) >= kAlignmentWait_s;
+  return !alignment_not_taken;
 }
 
 void FusionGate::Impl::judge(const AcceptedFix& fix,
@@ -157,6 +162,7 @@ void FusionGate::Impl::take_lio_status(const LioStatus& next, Output& out) {
   lio = next;
   monitor.on_lio_status(next, lio_poses.distance_m());
   if (aligned()) {
+    alignment_not_taken = false;
     placements.add(next, lio_poses.distance_m());
   }
   if (aligned() && !was_aligned) {
@@ -174,6 +180,7 @@ void FusionGate::Impl::begin_epoch(const LioStatus& next, Output& out) {
   }
   queue.clear_waiting();
   alignment_sent_ns.reset();
+  alignment_not_taken = false;
   monitor.begin_anew();
   placements.clear();
   awaited.reset();
