@@ -116,7 +116,11 @@ FusionGate::Impl::Told FusionGate::Impl::take_records(const GpsStatus& gps,
   std::vector<ToldFix> all = told_fixes(gps);
   const std::size_t wanted = std::max<std::size_t>(1, open_fixes(gps, last));
   if (!last && all.size() > wanted) {
-    all.erase(all.begin(), all.end() - static_cast<std::ptrdiff_t>(wanted));
+    const auto first_wanted = all.end() - static_cast<std::ptrdiff_t>(wanted);
+    for (auto one = all.begin(); one != first_wanted; ++one) {
+      verdicts.remember(one->fix.stamp_ns);  // the next status tells of it again
+    }
+    all.erase(all.begin(), first_wanted);
   }
   const bool repeats =
       gps.recent_fixes.empty() && last && gps.last_accepted_fix_ns == last->last_accepted_fix_ns;
@@ -223,16 +227,18 @@ ForeignSource& FusionGate::Impl::foreign(const std::string& writer) {
 /// True when nobody had told of the fix yet. What is held of one that waits is brought up to date.
 bool FusionGate::Impl::tell_of(ToldFix told, Output& out) {
   const Nanoseconds stamp_ns = told.fix.stamp_ns;
+  if (!told.refused_by_filter && !told.fault) {
+    told.fault = check_values(told.fix);
+  }
   if (const ToldFix* known = queue.find(stamp_ns)) {
-    told.fault = known->fault;
+    if (!told.refusal() && known->refusal()) {
+      note_accepted(told.fix);
+    }
     queue.put(told);
     return false;
   }
   if (!verdicts.is_new(stamp_ns)) {
     return false;
-  }
-  if (!told.refused_by_filter && !told.fault) {
-    told.fault = check_values(told.fix);
   }
   std::optional<Refusal> late;
   if (!told.refusal()) {

@@ -5,6 +5,7 @@
 #include "trigpoint/base/config.hpp"
 
 #include "simulated_drive.hpp"
+#include "verdict_counts.hpp"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -16,15 +17,6 @@ namespace trigpoint::fusion_gate {
 namespace {
 
 using testing::HasSubstr;
-
-std::uint64_t count_of(const FusionStatus& status, const std::string& code) {
-  for (const NamedCount& entry : status.verdicts) {
-    if (entry.name == code) {
-      return entry.count;
-    }
-  }
-  return 0;
-}
 
 Scenario with_outage(double from_s, double until_s, double sigma_m) {
   Scenario scenario;
@@ -424,143 +416,6 @@ TEST(FusionGateConfig, is_loaded_strictly_and_refuses_an_unknown_mode) {
   EXPECT_THROW(load_config_text("fusion_gate: {mode: soft}", "test", document), ConfigError);
   EXPECT_THROW(load_config_text("fusion_gate: {threshold: [0, 1, 1]}", "test", document),
                ConfigError);
-}
-
-/// A filter and its receiver, message by message; every raw fix also goes to the gate.
-class ToldFilter {
- public:
-  ToldFilter() : gate_(Config{}, RobotConfig{}) {
-    status_.source = "ekf15";
-    status_.health = GpsHealth::kOk;
-    status_.datum_id = Datum{49.0, 8.0, 100.0, 0}.id();
-    status_.accepted_covariance_map_m2 = Eigen::Matrix3d::Identity() * 1e-4;
-    status_.accepted_antenna_map_m.setZero();
-    tell(1000.0);
-  }
-
-  void accepts(double stamp_s) {
-    receives(stamp_s);
-    ++status_.fixes_accepted;
-    if (!status_.datum_id.empty()) {
-      status_.last_accepted_fix_ns = std::max(status_.last_accepted_fix_ns, from_seconds(stamp_s));
-    }
-    tell(stamp_s);
-  }
-
-  void refuses(double stamp_s, const std::string& reason) {
-    receives(stamp_s);
-    note(reason);
-    tell(stamp_s);
-  }
-
-  void note(const std::string& reason) {
-    for (NamedCount& entry : status_.rejections) {
-      if (entry.name == reason) {
-        ++entry.count;
-        return;
-      }
-    }
-    status_.rejections.push_back({reason, 1});
-  }
-
-  void lio_at(double stamp_s) {
-    Odometry odometry;
-    odometry.stamp_ns = from_seconds(stamp_s);
-    odometry.pose_covariance = PoseCovariance::Identity() * 1e-4;
-    keep(gate_.on_lio_odometry(odometry));
-  }
-
-  void tell(double stamp_s) {
-    status_.stamp_ns = std::max(status_.stamp_ns, from_seconds(stamp_s));
-    keep(gate_.on_gps_status(status_, "gps-a"));
-  }
-
-  GpsStatus& status() { return status_; }
-
-  const FusionStatus& last() const { return last_; }
-
-  std::uint64_t verdicts() const {
-    std::uint64_t sum = 0;
-    for (const NamedCount& entry : last_.verdicts) {
-      sum += entry.count;
-    }
-    return sum;
-  }
-
- private:
-  void receives(double stamp_s) {
-    GnssFix fix;
-    fix.stamp_ns = from_seconds(stamp_s);
-    keep(gate_.on_fix(fix));
-    ++status_.fixes_received;
-  }
-
-  void keep(const Output& out) { last_ = out.status.value_or(last_); }
-
-  FusionGate gate_;
-  GpsStatus status_;
-  FusionStatus last_;
-};
-
-TEST(FusionGateVerdicts, are_one_a_fix_also_when_a_late_fix_was_overtaken) {
-  ToldFilter filter;
-  for (int k = 0; k < 20; ++k) {
-    // Every fifth comes behind its successor.
-    const int order = k % 5 == 0 ? k + 1 : k % 5 == 1 ? k - 1 : k;
-    filter.accepts(1000.2 + 0.2 * order);
-    filter.lio_at(1000.3 + 0.2 * k);
-  }
-  filter.lio_at(1006.0);
-  EXPECT_EQ(filter.last().fixes_seen, 20U);
-  EXPECT_EQ(filter.verdicts(), 20U);
-  EXPECT_EQ(count_of(filter.last(), "behind_newer_fix"), 4U);
-  EXPECT_EQ(count_of(filter.last(), "waiting"), 0U);
-}
-
-TEST(FusionGateVerdicts, take_a_remark_on_a_used_fix_or_on_the_imu_for_no_refusal) {
-  ToldFilter filter;
-  for (int k = 0; k < 6; ++k) {
-    filter.note("used_with_default_covariance");
-    filter.note("imu_not_finite");
-    filter.accepts(1000.2 + 0.2 * k);
-  }
-  filter.note("imu_not_finite");
-  filter.refuses(1001.4, "gate");
-  filter.lio_at(1001.9);
-  EXPECT_EQ(filter.verdicts(), 7U);
-  EXPECT_EQ(count_of(filter.last(), "refused_by_filter_gate"), 1U);
-  for (const NamedCount& entry : filter.last().verdicts) {
-    EXPECT_THAT(entry.name, testing::Not(HasSubstr("imu_")));
-    EXPECT_THAT(entry.name, testing::Not(HasSubstr("used_with")));
-  }
-}
-
-TEST(FusionGateVerdicts, give_a_fix_from_before_the_datum_one_verdict_only) {
-  ToldFilter filter;
-  const std::string datum = filter.status().datum_id;
-  filter.status().datum_id.clear();
-  filter.accepts(1000.2);
-  filter.accepts(1000.4);
-  EXPECT_EQ(count_of(filter.last(), "before_datum"), 2U);
-  filter.status().datum_id = datum;
-  filter.status().last_accepted_fix_ns = from_seconds(1000.4);
-  filter.tell(1000.5);  // the datum came from elsewhere; the fix now has a place in map
-  filter.accepts(1000.6);
-  filter.lio_at(1001.0);
-  EXPECT_EQ(filter.last().fixes_seen, 3U);
-  EXPECT_EQ(filter.verdicts(), 3U);
-}
-
-TEST(FusionGateVerdicts, count_fixes_of_which_no_filter_has_told_as_waiting) {
-  FusionGate gate{Config{}, RobotConfig{}};
-  Odometry lio;
-  lio.stamp_ns = from_seconds(1000.0);
-  gate.on_lio_odometry(lio);
-  GnssFix fix;
-  fix.stamp_ns = from_seconds(1000.1);
-  const Output out = gate.on_fix(fix);
-  ASSERT_TRUE(out.status);
-  EXPECT_EQ(count_of(*out.status, "waiting"), 1U);
 }
 
 }  // namespace

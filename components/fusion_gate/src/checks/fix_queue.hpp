@@ -14,7 +14,7 @@ namespace trigpoint::fusion_gate {
 struct ToldFix {
   AcceptedFix fix;
   std::optional<Refusal> refused_by_filter;  ///< as of now: a late fix may change it
-  std::optional<Refusal> fault;              ///< found by the gate when it was told of first
+  std::optional<Refusal> fault;              ///< found by the gate in what was told of it last
 
   std::optional<Refusal> refusal() const { return refused_by_filter ? refused_by_filter : fault; }
 };
