@@ -50,7 +50,10 @@ struct FusionGate::Impl {
   std::uint64_t open_fixes(const GpsStatus& status, const std::optional<GpsStatus>& last) const;
   bool tell_of(ToldFix told, Output& out);
   void note_accepted(const AcceptedFix& fix);
+  void record_unjudged(const ToldFix& told, const Refusal& otherwise);
+  void refuse_waiting(const Refusal& why);
   void follow_healthiest(Output& out);
+  bool names_datum(const std::string& id) const;
   ForeignSource& foreign(const std::string& writer);
 
   // --- alignment and rows

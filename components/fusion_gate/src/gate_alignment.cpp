@@ -13,6 +13,11 @@ namespace {
 constexpr double kDegrees = 180.0 / std::numbers::pi;
 constexpr double kAlignmentWait_s = 0.5;  // a mapper has it with its next scan
 
+/// A fix may wait for order as long as it may be late, and for LIO's next scan to cover it. One
+/// that waited longer, for the mapper or for its poses, is older than the mapper's rows.history_s
+/// allows.
+constexpr double kJudgingSlack_s = 0.15;
+
 }  // namespace
 
 void FusionGate::Impl::judge_waiting(Output& out) {
@@ -58,6 +63,10 @@ void FusionGate::Impl::judge(const AcceptedFix& fix,
     verdicts.record(fix.stamp_ns, false, "no_lio_pose", "no LIO pose at the fix's stamp");
   } else if (!aligned()) {
     add_pair(fix, lio_pose.sample, out);
+  } else if (const auto late =
+                 check_age(fix, last_lio_ns, config.max_fix_age_s + kJudgingSlack_s)) {
+    verdicts.record(fix.stamp_ns, false, late->code, late->reason);
+    tell(out, Severity::kWarning, "fix_refused", late->reason);
   } else if (mode == Mode::kSmooth) {
     judge_values(fix, lio_pose.sample, out);
   } else {
@@ -173,12 +182,7 @@ void FusionGate::Impl::take_lio_status(const LioStatus& next, Output& out) {
 void FusionGate::Impl::begin_epoch(const LioStatus& next, Output& out) {
   lio_poses.forget_before(next.stamp_ns);
   window.clear();
-  for (const ToldFix& told : queue.waiting()) {
-    const Nanoseconds stamp_ns = told.fix.stamp_ns;
-    verdicts.record(stamp_ns, false, "odom_epoch", "LIO began another odom epoch meanwhile");
-    verdict_changed = true;
-  }
-  queue.clear_waiting();
+  refuse_waiting({"odom_epoch", "LIO began another odom epoch meanwhile"});
   alignment_sent_ns.reset();
   alignment_not_taken = false;
   monitor.begin_anew();

@@ -258,10 +258,24 @@ bool FusionGate::Impl::tell_of(ToldFix told, Output& out) {
   }
   queue.put(told);
   if (queue.waiting().size() > kMaxWaitingFixes) {
-    verdicts.record(
-        queue.take().fix.stamp_ns, false, "no_lio_pose", "LIO never covered the fix's stamp");
+    record_unjudged(queue.take(), {"no_lio_pose", "LIO never covered the fix's stamp"});
   }
   return true;
+}
+
+/// The verdict of a fix that leaves the queue by force: what it was refused for already, if
+/// anything.
+void FusionGate::Impl::record_unjudged(const ToldFix& told, const Refusal& otherwise) {
+  const Refusal why = told.refusal().value_or(otherwise);
+  verdicts.record(told.fix.stamp_ns, false, why.code, why.reason);
+  verdict_changed = true;
+}
+
+void FusionGate::Impl::refuse_waiting(const Refusal& why) {
+  for (const ToldFix& told : queue.waiting()) {
+    record_unjudged(told, why);
+  }
+  queue.clear_waiting();
 }
 
 void FusionGate::Impl::note_accepted(const AcceptedFix& fix) {
@@ -273,6 +287,12 @@ void FusionGate::Impl::note_accepted(const AcceptedFix& fix) {
     fix_intervals_s.pop_front();
   }
   last_accepted_ns = std::max(last_accepted_ns.value_or(fix.stamp_ns), fix.stamp_ns);
+}
+
+/// Whether the followed filter's fixes are in this datum.
+bool FusionGate::Impl::names_datum(const std::string& id) const {
+  const GpsSource* source = sources.followed_source();
+  return source != nullptr && source->status && source->status->datum_id == id;
 }
 
 void FusionGate::Impl::follow_healthiest(Output& out) {

@@ -242,5 +242,53 @@ TEST(FusionGateVerdicts, leave_out_the_fixes_from_before_the_gate_began) {
   EXPECT_EQ(count_of(filter.last(), "waiting"), 0U);
 }
 
+TEST(FusionGateVerdicts, refuse_what_waits_in_a_datum_that_is_no_longer_ours) {
+  ToldFilter filter;
+  filter.datum({49.0, 8.0, 100.0, 50});
+  filter.tells_of(record_of(1000.2));
+  filter.datum({49.1, 8.0, 100.0, 40});  // elected earlier
+  filter.lio_at(1000.2);
+  filter.lio_at(1001.9);
+  EXPECT_EQ(count_of(filter.last(), "other_datum"), 1U);
+  EXPECT_EQ(filter.verdicts(), 1U);
+}
+
+TEST(FusionGateVerdicts, keep_what_waits_when_the_first_datum_is_the_filters) {
+  ToldFilter same;
+  ToldFilter other;
+  for (ToldFilter* filter : {&same, &other}) {
+    filter->tells_of(record_of(1000.2));
+    filter->datum({filter == &same ? 49.0 : 49.1, 8.0, 100.0, 0});
+    filter->lio_at(1000.2);
+    filter->lio_at(1001.9);
+    EXPECT_EQ(filter->verdicts(), 1U);
+  }
+  EXPECT_EQ(count_of(same.last(), "other_datum"), 0U);
+  EXPECT_EQ(count_of(other.last(), "other_datum"), 1U);
+}
+
+TEST(FusionGateVerdicts, name_the_filters_refusal_of_a_fix_that_the_full_queue_drops_and_say_so) {
+  constexpr int kMayWait = 64;
+  ToldFilter filter;
+  for (int k = 1; k <= kMayWait; ++k) {
+    filter.tells_of(record_of(1000.0 + 0.01 * k, "gate"));
+  }
+  EXPECT_EQ(count_of(filter.last(), "waiting"), 64U);
+  // An older one: data time stands still, no status is due.
+  filter.tells_of(record_of(1000.005, "gate"));
+  EXPECT_EQ(count_of(filter.last(), "refused_by_filter_gate"), 1U);
+  EXPECT_EQ(count_of(filter.last(), "no_lio_pose"), 0U);
+}
+
+TEST(FusionGateVerdicts, name_the_filters_refusal_of_a_fix_that_waits_when_an_odom_epoch_begins) {
+  ToldFilter filter;
+  filter.lio_says(1000.1, 7, false);
+  filter.tells_of(record_of(1000.2, "gate"));
+  filter.tells_of(record_of(1000.4));
+  filter.lio_says(1000.5, 8, false);
+  EXPECT_EQ(count_of(filter.last(), "refused_by_filter_gate"), 1U);
+  EXPECT_EQ(count_of(filter.last(), "odom_epoch"), 1U);
+}
+
 }  // namespace
 }  // namespace trigpoint::fusion_gate
