@@ -83,6 +83,25 @@ TEST(FusionGate, judges_every_fix_of_a_mapper_that_never_takes_the_alignment) {
             to_seconds(span_ns) / scenario.fix_interval_s);
 }
 
+TEST(FusionGate, waits_once_in_every_odom_epoch_for_the_mapper_to_take_the_alignment) {
+  Scenario scenario;
+  scenario.with_mapper = false;
+  SimulatedDrive drive{scenario};
+  double now_s = 0.0;
+  for (int epoch = 0; epoch < 2; ++epoch) {
+    const std::size_t before = drive.record().updates.size();
+    while (drive.record().updates.size() == before && now_s < 30.0) {
+      drive.run_until(now_s += 0.01);
+    }
+    drive.run_until(now_s += 0.45);
+    EXPECT_EQ(drive.record().updates.size(), before + 1) << epoch;
+    drive.run_until(now_s += 1.0);
+    EXPECT_GE(drive.record().updates.size(), before + 6) << epoch;  // fixes of 1.2 s
+    drive.begin_epoch(scenario.T_map_odom);
+    drive.run_until(now_s += 0.2);  // and LIO's status has told of it
+  }
+}
+
 TEST(FusionGate, makes_one_row_set_a_fix_whatever_the_rate_of_the_odometry) {
   Scenario scenario;
   scenario.gps_odometry_hz = 5.0;
