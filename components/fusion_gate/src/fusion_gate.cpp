@@ -68,12 +68,17 @@ Output FusionGate::on_datum(const Datum& datum) {
         "datum " + datum.id() + " is not adopted: " + impl_->datum_id() + " was elected earlier");
     return out;
   }
+  const bool keeps_waiting = !impl_->frame && impl_->names_datum(datum.id());
   try {
     impl_->frame.emplace(datum);
   } catch (const std::exception& fault) {
     impl_->tell(out, Severity::kError, "datum_refused", fault.what());
     return out;
   }
+  if (!keeps_waiting) {
+    impl_->refuse_waiting({"other_datum", "the datum changed while the fix waited"});
+  }
+  impl_->alignment_sent_ns.reset();
   impl_->window.clear();
   impl_->monitor.begin_anew();
   impl_->raw_fixes.clear();

@@ -50,7 +50,10 @@ struct FusionGate::Impl {
   std::uint64_t open_fixes(const GpsStatus& status, const std::optional<GpsStatus>& last) const;
   bool tell_of(ToldFix told, Output& out);
   void note_accepted(const AcceptedFix& fix);
+  void record_unjudged(const ToldFix& told, const Refusal& otherwise);
+  void refuse_waiting(const Refusal& why);
   void follow_healthiest(Output& out);
+  bool names_datum(const std::string& id) const;
   ForeignSource& foreign(const std::string& writer);
 
   // --- alignment and rows
@@ -118,6 +121,7 @@ struct FusionGate::Impl {
   AlignmentWindow window;
   FixQueue queue;  // told of, waiting for earlier fixes and for LIO to cover their stamps
   std::optional<Nanoseconds> alignment_sent_ns;  // and the mapper has not said that it has it
+  bool alignment_not_taken{false};               // the mapper was waited for, in vain
   std::map<std::string, ForeignSource> foreign_sources;
   std::optional<geodesy::LocalFrame> frame;
   std::optional<LioStatus> lio;

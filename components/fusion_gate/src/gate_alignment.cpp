@@ -11,7 +11,12 @@ namespace trigpoint::fusion_gate {
 namespace {
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
-constexpr double kRepeatAlignment_s = 0.5;  // a mapper has it with its next scan
+constexpr double kAlignmentWait_s = 0.5;  // a mapper has it with its next scan
+
+/// A fix may wait for order as long as it may be late, and for LIO's next scan to cover it. One
+/// that waited longer, for the mapper or for its poses, is older than the mapper's rows.history_s
+/// allows.
+constexpr double kJudgingSlack_s = 0.15;
 
 }  // namespace
 
@@ -37,13 +42,18 @@ void FusionGate::Impl::judge_waiting(Output& out) {
   }
 }
 
-/// An alignment is on its way: what comes next is to be held against it.
+/// An alignment is on its way: what comes next is to be held against it. Once in an epoch: a mapper
+/// that did not take the first one may never take any, and fixes must not pile up behind it.
 bool FusionGate::Impl::is_mapper_awaited(Output& out) {
   if (aligned()) {
     alignment_sent_ns.reset();
     return is_replacement_awaited(out);
   }
-  return alignment_sent_ns && to_seconds(now_ns - *alignment_sent_ns) < kRepeatAlignment_s;
+  if (!lio || alignment_not_taken || !alignment_sent_ns) {
+    return false;
+  }
+  alignment_not_taken = to_seconds(now_ns - *alignment_sent_ns) >= kAlignmentWait_s;
+  return !alignment_not_taken;
 }
 
 void FusionGate::Impl::judge(const AcceptedFix& fix,
@@ -53,6 +63,10 @@ void FusionGate::Impl::judge(const AcceptedFix& fix,
     verdicts.record(fix.stamp_ns, false, "no_lio_pose", "no LIO pose at the fix's stamp");
   } else if (!aligned()) {
     add_pair(fix, lio_pose.sample, out);
+  } else if (const auto late =
+                 check_age(fix, last_lio_ns, config.max_fix_age_s + kJudgingSlack_s)) {
+    verdicts.record(fix.stamp_ns, false, late->code, late->reason);
+    tell(out, Severity::kWarning, "fix_refused", late->reason);
   } else if (mode == Mode::kSmooth) {
     judge_values(fix, lio_pose.sample, out);
   } else {
@@ -157,6 +171,7 @@ void FusionGate::Impl::take_lio_status(const LioStatus& next, Output& out) {
   lio = next;
   monitor.on_lio_status(next, lio_poses.distance_m());
   if (aligned()) {
+    alignment_not_taken = false;
     placements.add(next, lio_poses.distance_m());
   }
   if (aligned() && !was_aligned) {
@@ -167,13 +182,9 @@ void FusionGate::Impl::take_lio_status(const LioStatus& next, Output& out) {
 void FusionGate::Impl::begin_epoch(const LioStatus& next, Output& out) {
   lio_poses.forget_before(next.stamp_ns);
   window.clear();
-  for (const ToldFix& told : queue.waiting()) {
-    const Nanoseconds stamp_ns = told.fix.stamp_ns;
-    verdicts.record(stamp_ns, false, "odom_epoch", "LIO began another odom epoch meanwhile");
-    verdict_changed = true;
-  }
-  queue.clear_waiting();
+  refuse_waiting({"odom_epoch", "LIO began another odom epoch meanwhile"});
   alignment_sent_ns.reset();
+  alignment_not_taken = false;
   monitor.begin_anew();
   placements.clear();
   awaited.reset();

@@ -116,7 +116,11 @@ FusionGate::Impl::Told FusionGate::Impl::take_records(const GpsStatus& gps,
   std::vector<ToldFix> all = told_fixes(gps);
   const std::size_t wanted = std::max<std::size_t>(1, open_fixes(gps, last));
   if (!last && all.size() > wanted) {
-    all.erase(all.begin(), all.end() - static_cast<std::ptrdiff_t>(wanted));
+    const auto first_wanted = all.end() - static_cast<std::ptrdiff_t>(wanted);
+    for (auto one = all.begin(); one != first_wanted; ++one) {
+      verdicts.remember(one->fix.stamp_ns);  // the next status tells of it again
+    }
+    all.erase(all.begin(), first_wanted);
   }
   const bool repeats =
       gps.recent_fixes.empty() && last && gps.last_accepted_fix_ns == last->last_accepted_fix_ns;
@@ -223,16 +227,18 @@ ForeignSource& FusionGate::Impl::foreign(const std::string& writer) {
 /// True when nobody had told of the fix yet. What is held of one that waits is brought up to date.
 bool FusionGate::Impl::tell_of(ToldFix told, Output& out) {
   const Nanoseconds stamp_ns = told.fix.stamp_ns;
+  if (!told.refused_by_filter && !told.fault) {
+    told.fault = check_values(told.fix);
+  }
   if (const ToldFix* known = queue.find(stamp_ns)) {
-    told.fault = known->fault;
+    if (!told.refusal() && known->refusal()) {
+      note_accepted(told.fix);
+    }
     queue.put(told);
     return false;
   }
   if (!verdicts.is_new(stamp_ns)) {
     return false;
-  }
-  if (!told.refused_by_filter && !told.fault) {
-    told.fault = check_values(told.fix);
   }
   std::optional<Refusal> late;
   if (!told.refusal()) {
@@ -252,10 +258,24 @@ bool FusionGate::Impl::tell_of(ToldFix told, Output& out) {
   }
   queue.put(told);
   if (queue.waiting().size() > kMaxWaitingFixes) {
-    verdicts.record(
-        queue.take().fix.stamp_ns, false, "no_lio_pose", "LIO never covered the fix's stamp");
+    record_unjudged(queue.take(), {"no_lio_pose", "LIO never covered the fix's stamp"});
   }
   return true;
+}
+
+/// The verdict of a fix that leaves the queue by force: what it was refused for already, if
+/// anything.
+void FusionGate::Impl::record_unjudged(const ToldFix& told, const Refusal& otherwise) {
+  const Refusal why = told.refusal().value_or(otherwise);
+  verdicts.record(told.fix.stamp_ns, false, why.code, why.reason);
+  verdict_changed = true;
+}
+
+void FusionGate::Impl::refuse_waiting(const Refusal& why) {
+  for (const ToldFix& told : queue.waiting()) {
+    record_unjudged(told, why);
+  }
+  queue.clear_waiting();
 }
 
 void FusionGate::Impl::note_accepted(const AcceptedFix& fix) {
@@ -267,6 +287,12 @@ void FusionGate::Impl::note_accepted(const AcceptedFix& fix) {
     fix_intervals_s.pop_front();
   }
   last_accepted_ns = std::max(last_accepted_ns.value_or(fix.stamp_ns), fix.stamp_ns);
+}
+
+/// Whether the followed filter's fixes are in this datum.
+bool FusionGate::Impl::names_datum(const std::string& id) const {
+  const GpsSource* source = sources.followed_source();
+  return source != nullptr && source->status && source->status->datum_id == id;
 }
 
 void FusionGate::Impl::follow_healthiest(Output& out) {

@@ -97,6 +97,28 @@ TEST(FixQueue, gives_fixes_in_the_order_of_their_stamps_however_they_come) {
   }
 }
 
+TEST(FixQueue, does_not_hear_stamps_from_the_far_future) {
+  FixQueue queue = settled(10);
+  for (int k = 0; k < 40; ++k) {
+    queue.hear(stamp_of(1'000'000 + k), stamp_of(10));
+  }
+  queue.put(told(10));
+  EXPECT_EQ(take_ready(queue, stamp_of(10)), std::vector{stamp_of(10)});
+}
+
+TEST(FixQueue, forgets_stamps_from_the_future_that_it_heard_before_there_was_a_data_time) {
+  FixQueue queue(kWindow_s);
+  for (int k = 0; k < 40; ++k) {
+    queue.hear(stamp_of(1'000'000 + k), 0);
+  }
+  for (int k = 0; k < 20; ++k) {
+    queue.hear(stamp_of(k), stamp_of(k));
+    queue.put(told(k));
+    take_ready(queue, stamp_of(k));
+  }
+  EXPECT_TRUE(queue.waiting().empty());
+}
+
 TEST(FixQueue, keeps_what_was_told_last_of_a_fix_that_waits) {
   FixQueue queue = settled(10);
   queue.put(told(11));

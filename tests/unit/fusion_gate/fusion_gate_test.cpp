@@ -5,6 +5,7 @@
 #include "trigpoint/base/config.hpp"
 
 #include "simulated_drive.hpp"
+#include "verdict_counts.hpp"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -16,15 +17,6 @@ namespace trigpoint::fusion_gate {
 namespace {
 
 using testing::HasSubstr;
-
-std::uint64_t count_of(const FusionStatus& status, const std::string& code) {
-  for (const NamedCount& entry : status.verdicts) {
-    if (entry.name == code) {
-      return entry.count;
-    }
-  }
-  return 0;
-}
 
 Scenario with_outage(double from_s, double until_s, double sigma_m) {
   Scenario scenario;
@@ -73,6 +65,41 @@ TEST(FusionGate, repeats_the_first_alignment_until_the_mapper_has_it) {
     EXPECT_EQ(update.decision[0], AxisDecision::kLio);  // its fix is in the alignment already
   }
   EXPECT_TRUE(record.fused.empty());
+}
+
+TEST(FusionGate, judges_every_fix_of_a_mapper_that_never_takes_the_alignment) {
+  Scenario scenario;
+  scenario.with_mapper = false;
+  scenario.duration_s = 60.0;  // 300 fixes, more than may wait
+  const Record record = SimulatedDrive{scenario}.run();
+  const FusionStatus& status = record.statuses.back();
+  EXPECT_EQ(count_of(status, "no_lio_pose"), 0U);
+  EXPECT_LE(count_of(status, "waiting"), 2U);
+  ASSERT_FALSE(record.updates.empty());
+  // All but those of the one wait, and the alignment is repeated with each fix.
+  const Nanoseconds span_ns =
+      record.updates.back().fix_stamp_ns - record.updates.front().fix_stamp_ns;
+  EXPECT_GE(static_cast<double>(record.updates.size()),
+            to_seconds(span_ns) / scenario.fix_interval_s);
+}
+
+TEST(FusionGate, waits_once_in_every_odom_epoch_for_the_mapper_to_take_the_alignment) {
+  Scenario scenario;
+  scenario.with_mapper = false;
+  SimulatedDrive drive{scenario};
+  double now_s = 0.0;
+  for (int epoch = 0; epoch < 2; ++epoch) {
+    const std::size_t before = drive.record().updates.size();
+    while (drive.record().updates.size() == before && now_s < 30.0) {
+      drive.run_until(now_s += 0.01);
+    }
+    drive.run_until(now_s += 0.45);
+    EXPECT_EQ(drive.record().updates.size(), before + 1) << epoch;
+    drive.run_until(now_s += 1.0);
+    EXPECT_GE(drive.record().updates.size(), before + 6) << epoch;  // fixes of 1.2 s
+    drive.begin_epoch(scenario.T_map_odom);
+    drive.run_until(now_s += 0.2);  // and LIO's status has told of it
+  }
 }
 
 TEST(FusionGate, makes_one_row_set_a_fix_whatever_the_rate_of_the_odometry) {
@@ -195,6 +222,24 @@ TEST(FusionGate, refuses_fixes_that_are_too_late_with_the_numbers) {
   EXPECT_GT(count_of(record.statuses.back(), "late"), 100U);
 }
 
+TEST(FusionGate, makes_no_row_that_the_mapper_would_find_too_old) {
+  constexpr double kMapperHistory_s = 1.5;  // its rows.history_s
+  SimulatedDrive drive{Scenario{}};
+  drive.run_until(20.0);
+  drive.lio_alive = false;  // scans come late; odometry at IMU rate goes on
+  drive.run_until(22.0);
+  const std::size_t before = drive.record().updates.size();
+  for (int k = 0; k < 20; ++k) {
+    drive.keep(drive.gate().on_lio_odometry(drive.lio_odometry(20.0 + 0.1 * k)));
+  }
+  const std::vector<StateUpdate>& updates = drive.record().updates;
+  ASSERT_GT(updates.size(), before);
+  for (std::size_t k = before; k < updates.size(); ++k) {
+    EXPECT_LE(to_seconds(drive.stamp(21.99) - updates[k].fix_stamp_ns), kMapperHistory_s);
+  }
+  EXPECT_EQ(count_of(drive.record().statuses.back(), "late"), 3U);  // of 20.0, 20.2 and 20.4 s
+}
+
 TEST(FusionGate, judges_a_repeated_status_once) {
   SimulatedDrive drive{Scenario{}};
   drive.run_until(20.0);
@@ -236,7 +281,7 @@ TEST(FusionGate, mixes_no_pairs_of_two_odom_epochs) {
       EXPECT_NEAR(update.first_alignment->T_map_odom.yaw_rad, moved.yaw_rad, 1e-3);
     }
   }
-  EXPECT_GT(of_new_epoch, 10U);  // one in half a second
+  EXPECT_GT(of_new_epoch, 20U);
 }
 
 TEST(FusionGate, aligns_anew_in_a_new_odom_epoch) {
@@ -408,143 +453,6 @@ TEST(FusionGateConfig, is_loaded_strictly_and_refuses_an_unknown_mode) {
   EXPECT_THROW(load_config_text("fusion_gate: {mode: soft}", "test", document), ConfigError);
   EXPECT_THROW(load_config_text("fusion_gate: {threshold: [0, 1, 1]}", "test", document),
                ConfigError);
-}
-
-/// A filter and its receiver, message by message; every raw fix also goes to the gate.
-class ToldFilter {
- public:
-  ToldFilter() : gate_(Config{}, RobotConfig{}) {
-    status_.source = "ekf15";
-    status_.health = GpsHealth::kOk;
-    status_.datum_id = Datum{49.0, 8.0, 100.0, 0}.id();
-    status_.accepted_covariance_map_m2 = Eigen::Matrix3d::Identity() * 1e-4;
-    status_.accepted_antenna_map_m.setZero();
-    tell(1000.0);
-  }
-
-  void accepts(double stamp_s) {
-    receives(stamp_s);
-    ++status_.fixes_accepted;
-    if (!status_.datum_id.empty()) {
-      status_.last_accepted_fix_ns = std::max(status_.last_accepted_fix_ns, from_seconds(stamp_s));
-    }
-    tell(stamp_s);
-  }
-
-  void refuses(double stamp_s, const std::string& reason) {
-    receives(stamp_s);
-    note(reason);
-    tell(stamp_s);
-  }
-
-  void note(const std::string& reason) {
-    for (NamedCount& entry : status_.rejections) {
-      if (entry.name == reason) {
-        ++entry.count;
-        return;
-      }
-    }
-    status_.rejections.push_back({reason, 1});
-  }
-
-  void lio_at(double stamp_s) {
-    Odometry odometry;
-    odometry.stamp_ns = from_seconds(stamp_s);
-    odometry.pose_covariance = PoseCovariance::Identity() * 1e-4;
-    keep(gate_.on_lio_odometry(odometry));
-  }
-
-  void tell(double stamp_s) {
-    status_.stamp_ns = std::max(status_.stamp_ns, from_seconds(stamp_s));
-    keep(gate_.on_gps_status(status_, "gps-a"));
-  }
-
-  GpsStatus& status() { return status_; }
-
-  const FusionStatus& last() const { return last_; }
-
-  std::uint64_t verdicts() const {
-    std::uint64_t sum = 0;
-    for (const NamedCount& entry : last_.verdicts) {
-      sum += entry.count;
-    }
-    return sum;
-  }
-
- private:
-  void receives(double stamp_s) {
-    GnssFix fix;
-    fix.stamp_ns = from_seconds(stamp_s);
-    keep(gate_.on_fix(fix));
-    ++status_.fixes_received;
-  }
-
-  void keep(const Output& out) { last_ = out.status.value_or(last_); }
-
-  FusionGate gate_;
-  GpsStatus status_;
-  FusionStatus last_;
-};
-
-TEST(FusionGateVerdicts, are_one_a_fix_also_when_a_late_fix_was_overtaken) {
-  ToldFilter filter;
-  for (int k = 0; k < 20; ++k) {
-    // Every fifth comes behind its successor.
-    const int order = k % 5 == 0 ? k + 1 : k % 5 == 1 ? k - 1 : k;
-    filter.accepts(1000.2 + 0.2 * order);
-    filter.lio_at(1000.3 + 0.2 * k);
-  }
-  filter.lio_at(1006.0);
-  EXPECT_EQ(filter.last().fixes_seen, 20U);
-  EXPECT_EQ(filter.verdicts(), 20U);
-  EXPECT_EQ(count_of(filter.last(), "behind_newer_fix"), 4U);
-  EXPECT_EQ(count_of(filter.last(), "waiting"), 0U);
-}
-
-TEST(FusionGateVerdicts, take_a_remark_on_a_used_fix_or_on_the_imu_for_no_refusal) {
-  ToldFilter filter;
-  for (int k = 0; k < 6; ++k) {
-    filter.note("used_with_default_covariance");
-    filter.note("imu_not_finite");
-    filter.accepts(1000.2 + 0.2 * k);
-  }
-  filter.note("imu_not_finite");
-  filter.refuses(1001.4, "gate");
-  filter.lio_at(1001.9);
-  EXPECT_EQ(filter.verdicts(), 7U);
-  EXPECT_EQ(count_of(filter.last(), "refused_by_filter_gate"), 1U);
-  for (const NamedCount& entry : filter.last().verdicts) {
-    EXPECT_THAT(entry.name, testing::Not(HasSubstr("imu_")));
-    EXPECT_THAT(entry.name, testing::Not(HasSubstr("used_with")));
-  }
-}
-
-TEST(FusionGateVerdicts, give_a_fix_from_before_the_datum_one_verdict_only) {
-  ToldFilter filter;
-  const std::string datum = filter.status().datum_id;
-  filter.status().datum_id.clear();
-  filter.accepts(1000.2);
-  filter.accepts(1000.4);
-  EXPECT_EQ(count_of(filter.last(), "before_datum"), 2U);
-  filter.status().datum_id = datum;
-  filter.status().last_accepted_fix_ns = from_seconds(1000.4);
-  filter.tell(1000.5);  // the datum came from elsewhere; the fix now has a place in map
-  filter.accepts(1000.6);
-  filter.lio_at(1001.0);
-  EXPECT_EQ(filter.last().fixes_seen, 3U);
-  EXPECT_EQ(filter.verdicts(), 3U);
-}
-
-TEST(FusionGateVerdicts, count_fixes_of_which_no_filter_has_told_as_waiting) {
-  FusionGate gate{Config{}, RobotConfig{}};
-  Odometry lio;
-  lio.stamp_ns = from_seconds(1000.0);
-  gate.on_lio_odometry(lio);
-  GnssFix fix;
-  fix.stamp_ns = from_seconds(1000.1);
-  const Output out = gate.on_fix(fix);
-  ASSERT_TRUE(out.status);
-  EXPECT_EQ(count_of(*out.status, "waiting"), 1U);
 }
 
 }  // namespace

@@ -13,6 +13,7 @@ constexpr std::size_t kKnown = 32;
 constexpr std::size_t kLeastKnown = 8;    // fewer do not tell the receiver's interval
 constexpr double kLongestInterval = 1.6;  // of the usual one: stamps jitter, a lost fix makes two
 constexpr Nanoseconds kUntilTold_ns = 100'000'000;
+constexpr Nanoseconds kFarthestAhead_ns = kNanosecondsPerSecond;  // a stamp beyond has a wrong date
 
 bool is_earlier(const ToldFix& a, const ToldFix& b) {
   return a.fix.stamp_ns < b.fix.stamp_ns;
@@ -21,6 +22,13 @@ bool is_earlier(const ToldFix& a, const ToldFix& b) {
 }  // namespace
 
 void FixQueue::hear(Nanoseconds stamp_ns, Nanoseconds now_ns) {
+  if (now_ns > 0) {
+    const Nanoseconds latest_ns = now_ns + kFarthestAhead_ns;
+    known_.erase(known_.upper_bound(latest_ns), known_.end());  // they would displace true ones
+    if (stamp_ns > latest_ns) {
+      return;
+    }
+  }
   know(stamp_ns, now_ns + kUntilTold_ns);
 }
 

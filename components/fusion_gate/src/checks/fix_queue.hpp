@@ -14,7 +14,7 @@ namespace trigpoint::fusion_gate {
 struct ToldFix {
   AcceptedFix fix;
   std::optional<Refusal> refused_by_filter;  ///< as of now: a late fix may change it
-  std::optional<Refusal> fault;              ///< found by the gate when it was told of first
+  std::optional<Refusal> fault;              ///< found by the gate in what was told of it last
 
   std::optional<Refusal> refusal() const { return refused_by_filter ? refused_by_filter : fault; }
 };
@@ -27,7 +27,8 @@ class FixQueue {
   explicit FixQueue(double window_s) : window_s_(window_s) {}
 
   /// A message on gps/fix, whatever becomes of it. It counts as told of after a while: a filter
-  /// that refuses the message itself does not tell of it.
+  /// that refuses the message itself does not tell of it. `now_ns` is data time, 0 before there is
+  /// any; stamps far ahead of it are not heard.
   void hear(Nanoseconds stamp_ns, Nanoseconds now_ns);
 
   /// Adds a fix, or changes what is held of one that waits.

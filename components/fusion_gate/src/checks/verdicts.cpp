@@ -23,6 +23,10 @@ bool Verdicts::is_new(Nanoseconds fix_stamp_ns) {
   return true;
 }
 
+void Verdicts::remember(Nanoseconds fix_stamp_ns) {
+  is_new(fix_stamp_ns);
+}
+
 bool Verdicts::is_judged(Nanoseconds fix_stamp_ns) const {
   return std::find(judged_ns_.begin(), judged_ns_.end(), fix_stamp_ns) != judged_ns_.end();
 }

@@ -20,6 +20,9 @@ class Verdicts {
   /// reports it.
   bool is_new(Nanoseconds fix_stamp_ns);
 
+  /// A fix that gets no verdict here, now or later: it came before this gate began.
+  void remember(Nanoseconds fix_stamp_ns);
+
   bool is_judged(Nanoseconds fix_stamp_ns) const;
 
   void record(Nanoseconds fix_stamp_ns,
