@@ -285,7 +285,8 @@ TEST(FitCloud, says_that_a_corridor_leaves_its_own_direction_free) {
   map->insert(corridor);
   const auto found = fit_cloud(points, *map, moved_by({0.3, 0.1, 1.0}));
   ASSERT_TRUE(found.has_value());
-  EXPECT_GT(std::sqrt(found->covariance(0, 0)), 1.0);
+  // More than it is off along the corridor; planes where floor and wall meet tell a little.
+  EXPECT_GT(std::sqrt(found->covariance(0, 0)), 0.5);
   EXPECT_LT(std::sqrt(found->covariance(1, 1)), 0.05);
   EXPECT_NEAR(found->T_map_cloud.p.x(), 0.3, 0.05);
   EXPECT_NEAR(found->T_map_cloud.p.y(), 0.0, 0.02);
