@@ -33,6 +33,10 @@ constexpr double kFoundRotation_rad = 0.01;
 /// every metre it would leave the pose nothing to learn from GPS.
 constexpr double kMostInherited_m = 0.1;
 constexpr double kMostInherited_rad = 0.01;
+/// Planes as thin as this are as thin as range noise lets them be, ...
+constexpr double kSmooth_m = 0.01;
+/// ... and what a thicker one displaces at this distance turns the pose.
+constexpr double kLever_m = 10.0;
 /// A scan is put into the map unmatched only while its pose relative to the map is this certain.
 constexpr double kMapSigma_m = 0.3;
 
@@ -114,14 +118,16 @@ DriftRate drift_rate(const DriftConfig& drift, const Matrix6d& local, double rou
       axes.eigenvectors().transpose();
   const double most_rad2 = square(kMostInherited_rad);
   DriftRate rate;
-  const double everywhere_m2 =
-      square(drift.position_sigma_m_sqrtm) + drift.roughness_per_m * roughness2_m2;
+  const double rough_m2 = drift.roughness_per_m * std::max(0.0, roughness2_m2 - square(kSmooth_m));
+  const double everywhere_m2 = square(drift.position_sigma_m_sqrtm) + rough_m2;
   rate.position_m2 = everywhere_m2 * Matrix3d::Identity() + inherited * position_m2;
+  const double rough_rad2 = rough_m2 / square(kLever_m);
   const Eigen::Matrix2d tilt_rad2 = local.block<2, 2>(3, 3);
   rate.tilt_rad2 =
-      square(drift.tilt_sigma_rad_sqrtm) * Eigen::Matrix2d::Identity() +
+      (square(drift.tilt_sigma_rad_sqrtm) + rough_rad2) * Eigen::Matrix2d::Identity() +
       inherited * std::min(most_rad2, tilt_rad2.trace()) * tilt_rad2 / (tilt_rad2.trace() + 1e-18);
-  rate.yaw_rad2 = square(drift.yaw_sigma_rad_sqrtm) + inherited * std::min(most_rad2, local(5, 5));
+  rate.yaw_rad2 =
+      square(drift.yaw_sigma_rad_sqrtm) + rough_rad2 + inherited * std::min(most_rad2, local(5, 5));
   return rate;
 }
 

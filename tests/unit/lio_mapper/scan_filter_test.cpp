@@ -108,8 +108,10 @@ TEST(Drift, position_gathers_its_walk_a_share_of_the_roughness_and_one_of_the_lo
   local.diagonal().head<3>() << 1e-4, 4e-4, 1.0;  // the last above what is passed on
   const DriftRate rate = drift_rate(drift, local, 0.05 * 0.05);
   const Eigen::Vector3d expected_m2 =
-      Eigen::Vector3d::Constant(9e-6 + 0.02 * 0.0025) + 0.1 * Eigen::Vector3d(1e-4, 4e-4, 1e-2);
+      Eigen::Vector3d::Constant(9e-6 + 0.02 * 0.0024) + 0.1 * Eigen::Vector3d(1e-4, 4e-4, 1e-2);
   EXPECT_LT((rate.position_m2.diagonal() - expected_m2).norm(), 1e-12);
+  // The same over ten metres turns it.
+  EXPECT_NEAR(rate.yaw_rad2, 0.02 * 0.0024 / 100.0 + 25e-10, 1e-15);
 }
 
 TEST(Drift, tilt_noise_turns_odom_about_the_robot_and_leaves_its_place_in_map) {
