@@ -81,14 +81,6 @@ PastSettings past_settings_of(const std::string& session) {
   return settings;
 }
 
-lio_mapper::GraphKeyframe graph_keyframe_of(const lio_mapper::Keyframe& keyframe) {
-  return {keyframe.stamp_ns,
-          keyframe.odom_epoch,
-          keyframe.T_odom_base,
-          keyframe.aligned,
-          keyframe.T_map_odom};
-}
-
 GraphInput graph_input_of(const std::string& session) {
   GraphInput input;
   input.drift = past_settings_of(session).drift;

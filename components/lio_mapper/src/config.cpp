@@ -152,8 +152,7 @@ void describe_surfel_map(SurfelMapConfig& c, ConfigFields& f) {
   f.flag("nearest_points",
          c.nearest_points,
          "where planes leave the pose open, as in foliage, points without one may match one "
-         "through the "
-         "five nearest points");
+         "through the five nearest points");
   c.leaf_capacity = static_cast<std::size_t>(capacity);
 }
 

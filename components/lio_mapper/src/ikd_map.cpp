@@ -21,7 +21,7 @@ constexpr std::size_t kPlanePoints = 5;
 
 IkdMap::IkdMap(const IkdMapConfig& config) : config_(config) {}
 
-bool IkdMap::match(const Vector3d& point_odom_m, PlaneMatch& plane) const {
+bool IkdMap::match_surface(const Vector3d& point_odom_m, PlaneMatch& plane) const {
   std::array<IkdTree::Neighbour, kPlanePoints> found;
   const std::size_t count =
       tree_.nearest(point_odom_m.cast<float>(), static_cast<float>(config_.max_neighbour_m), found);

@@ -13,7 +13,7 @@ class IkdMap final : public LocalMap {
  public:
   explicit IkdMap(const IkdMapConfig& config);
 
-  bool match(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) const override;
+  bool match_surface(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) const override;
   void insert(const PointCloud& points_odom) override;
   void prune(const Eigen::Vector3d& center_odom_m, double half_side_m) override;
   void transform(const Pose& T_new_old) override;

@@ -28,14 +28,14 @@ class LocalMap {
 
   /// The plane that explains `point_odom_m`, or false where none holds. Safe to call from several
   /// threads at once between two changes of the map.
-  virtual bool match(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) const = 0;
-
-  /// The first and cheap part of `match`, and the dear part for points that it leaves without a
-  /// plane.
-  virtual bool match_surface(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) const {
-    return match(point_odom_m, plane);
+  bool match(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) const {
+    return match_surface(point_odom_m, plane) || match_nearest(point_odom_m, plane);
   }
 
+  /// The first and cheap part of `match`, ...
+  virtual bool match_surface(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) const = 0;
+
+  /// ... and the dear part, for points that it leaves without a plane.
   virtual bool match_nearest(const Eigen::Vector3d& /*point_odom_m*/, PlaneMatch& /*plane*/) const {
     return false;
   }

@@ -6,6 +6,14 @@
 
 namespace trigpoint::lio_mapper {
 
+GraphKeyframe graph_keyframe_of(const Keyframe& keyframe) {
+  return {keyframe.stamp_ns,
+          keyframe.odom_epoch,
+          keyframe.T_odom_base,
+          keyframe.aligned,
+          keyframe.T_map_odom};
+}
+
 void LioMapper::Impl::remember(const ScanResult& result) {
   if (!past) {
     return;
@@ -13,12 +21,7 @@ void LioMapper::Impl::remember(const ScanResult& result) {
   const Odometry& odometry = result.odometry;
   past->on_scan({odometry.stamp_ns, status.odom_epoch, odometry.T_frame_child});
   if (result.keyframe) {
-    const Keyframe& keyframe = *result.keyframe;
-    past->on_keyframe({keyframe.stamp_ns,
-                       keyframe.odom_epoch,
-                       keyframe.T_odom_base,
-                       keyframe.aligned,
-                       keyframe.T_map_odom});
+    past->on_keyframe(graph_keyframe_of(*result.keyframe));
   }
 }
 

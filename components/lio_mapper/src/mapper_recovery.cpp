@@ -69,7 +69,8 @@ void LioMapper::Impl::update_map(const ScanOutcome& outcome) {
   }
   const Eigen::Vector3d& p = filter->state().T_odom_base.p;
   if ((p - loaded_at_m).norm() > kReloadShare * config.local_map.half_side_m) {
-    filter->replace_map(load_map(config.local_map, stored_points, status.odom_epoch, p, false));
+    auto map = load_map(config.local_map, stored_points, status.odom_epoch, p, false);
+    filter->swap_map(map);
     loaded_at_m = p;
   }
 }

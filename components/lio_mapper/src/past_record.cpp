@@ -21,7 +21,6 @@ constexpr double kFirstRevisit_m = 20.0;
 constexpr double kNextRevisit_m = 100.0;
 /// So far from any earlier visit, and the next one is another.
 constexpr double kRevisitEnds_m = 20.0;
-constexpr double kHeight_m = 4.0;  // as in the search for loops
 /// A minute and a half at 10 Hz, 50 MB: who takes longer is late.
 constexpr std::size_t kMostInserted = 1000;
 
@@ -86,7 +85,7 @@ bool PastRecord::was_here_before() const {
                                 : !places_[i].in_map && input_.keyframes[i].odom_epoch == epoch;
     const Eigen::Vector3d apart = places_[i].p_m - here.p_m;
     if (comparable && apart.head<2>().norm() < options.loop_radius_m &&
-        std::abs(apart.z()) < kHeight_m) {
+        std::abs(apart.z()) < options.loop_height_m) {
       return true;
     }
   }

@@ -25,7 +25,6 @@ constexpr std::size_t kMostVisits = 2;  // that one keyframe is tied to
 constexpr double kMapVoxel_m = 0.3;
 constexpr double kScanVoxel_m = 0.6;
 constexpr std::size_t kMostPoints = 2000;
-constexpr double kHeight_m = 4.0;  // of two storeys of a car park
 /// The same two visits, farther along.
 constexpr double kNeighbours_m = 30.0;
 /// What two registrations may disagree in, besides the odometry between them.
@@ -68,7 +67,7 @@ std::vector<std::size_t> LoopSearch::visits_near(std::size_t from,
     const Vector3d apart = nodes[i].p - nodes[from].p;
     const double distance_m = apart.head<2>().norm();
     if (!places_.T_map_base[i] || distance_m > options_.loop_radius_m ||
-        std::abs(apart.z()) > kHeight_m) {
+        std::abs(apart.z()) > options_.loop_height_m) {
       continue;
     }
     if (visits.empty() || driven_m_[i] - driven_m_[visits.back().last] > options_.loop_apart_m) {

@@ -93,10 +93,7 @@ class ScanFilter {
 
   const LocalMap& map() const { return *map_; }
 
-  /// Another one of the same place.
-  void replace_map(std::unique_ptr<LocalMap> map) { map_ = std::move(map); }
-
-  /// The same; the caller has the old one to dispose of.
+  /// For another one of the same place; the caller has the old one to dispose of.
   void swap_map(std::unique_ptr<LocalMap>& map) { map_.swap(map); }
 
   Workers& workers() { return *workers_; }
@@ -155,7 +152,7 @@ class ScanFilter {
   bool aligned_{false};
   double distance_m_{0.0};
   Eigen::Vector3d pruned_at_m_{Eigen::Vector3d::Zero()};
-  double roughness2_m2_{0.0};     ///< of the planes that the last usable scan met
+  double roughness2_m2_{0.0};                    ///< of the planes that the last usable scan met
   Matrix6d drift_covariance_{Matrix6d::Zero()};  ///< of odom, about its origin, ROS order
 };
 

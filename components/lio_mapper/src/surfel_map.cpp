@@ -251,6 +251,13 @@ SurfelMap::ParentId SurfelMap::neighbour(const Parent& parent, int direction) co
                                                     : kNoParent;
 }
 
+SurfelMap::ParentId SurfelMap::neighbour(const VoxelIndex& home,
+                                         ParentId own,
+                                         int direction) const {
+  return own == kNoParent ? find(neighbour_index(home, direction))
+                          : neighbour(parent(own), direction);
+}
+
 SurfelMap::ParentId SurfelMap::find_or_create(const Place& place) {
   if (place.id != kNoParent) {
     return place.id;
@@ -403,8 +410,7 @@ PointCloud SurfelMap::points() const {
   cloud.reserve(leaf_count_);
   for (const Parent& parent : parents_) {
     const Eigen::Vector3d centre = centre_of(parent);
-    for (int i = 0; i < std::popcount(parent.occupied); ++i) {
-      const Leaf& leaf = leaves_[parent.first_leaf + static_cast<std::uint32_t>(i)];
+    for (const Leaf& leaf : leaves_of(parent)) {
       const Eigen::Vector3f p = (centre + metres(leaf.mean)).cast<float>();
       cloud.push_back({p.x(), p.y(), p.z(), static_cast<float>(leaf.intensity)});
     }

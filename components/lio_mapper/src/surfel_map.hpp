@@ -8,9 +8,11 @@
 #include <Eigen/Core>
 
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace trigpoint::lio_mapper {
@@ -31,10 +33,6 @@ namespace trigpoint::lio_mapper {
 class SurfelMap final : public LocalMap {
  public:
   explicit SurfelMap(const SurfelMapConfig& config);
-
-  bool match(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) const override {
-    return match_surface(point_odom_m, plane) || match_nearest(point_odom_m, plane);
-  }
 
   bool match_surface(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) const override;
   bool match_nearest(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) const override;
@@ -129,8 +127,16 @@ class SurfelMap final : public LocalMap {
 
   const Parent& parent(ParentId id) const { return parents_[static_cast<std::size_t>(id)]; }
 
+  /// In the order of their bits.
+  std::span<const Leaf> leaves_of(const Parent& parent) const {
+    return {leaves_.data() + parent.first_leaf,
+            static_cast<std::size_t>(std::popcount(parent.occupied))};
+  }
+
   ParentId find(const VoxelIndex& index) const;
   ParentId neighbour(const Parent& parent, int direction) const;
+  /// The same around a place whose parent is `own`, if there is one.
+  ParentId neighbour(const VoxelIndex& home, ParentId own, int direction) const;
   ParentId find_or_create(const Place& place);
   void put_into_table(ParentId id);
   void link(ParentId id);

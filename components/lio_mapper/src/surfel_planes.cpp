@@ -16,7 +16,6 @@ namespace trigpoint::lio_mapper {
 
 using surfel_grid::kFaceBand;
 using surfel_grid::kSide;
-using surfel_grid::neighbour_index;
 using surfel_grid::slot;
 
 namespace {
@@ -113,8 +112,7 @@ bool SurfelMap::match_surface(const Eigen::Vector3d& point_odom_m, PlaneMatch& m
       continue;
     }
     const int direction = slot(step[0] + 1, step[1] + 1, step[2] + 1);
-    const ParentId id = own == kNoParent ? find(neighbour_index(home, direction))
-                                         : neighbour(parent(own), direction);
+    const ParentId id = neighbour(home, own, direction);
     const auto plane = id == kNoParent ? std::nullopt : plane_of(id);
     if (!plane) {
       continue;
@@ -143,8 +141,7 @@ void SurfelMap::offer_points(const Parent& parent,
                              const Eigen::Vector3d& point_odom_m,
                              NearestPoints& nearest) const {
   const Eigen::Vector3d origin = centre_of(parent) - point_odom_m;
-  for (int i = 0; i < std::popcount(parent.occupied); ++i) {
-    const Leaf& leaf = leaves_[parent.first_leaf + static_cast<std::uint32_t>(i)];
+  for (const Leaf& leaf : leaves_of(parent)) {
     NearPoint candidate{0.0, origin + metres(leaf.point)};
     candidate.distance2_m2 = candidate.offset_m.squaredNorm();
     if (!(candidate.distance2_m2 < nearest.back().distance2_m2)) {
@@ -185,8 +182,7 @@ bool SurfelMap::match_nearest(const Eigen::Vector3d& point_odom_m, PlaneMatch& p
         nearest.back().distance2_m2) {
       continue;
     }
-    const ParentId id = own == kNoParent ? find(neighbour_index(home, direction))
-                                         : neighbour(parent(own), direction);
+    const ParentId id = neighbour(home, own, direction);
     if (id != kNoParent) {
       offer_points(parent(id), point_odom_m, nearest);
     }
@@ -255,13 +251,11 @@ std::optional<SurfelMap::Plane> SurfelMap::fit(const Parent& parent, int& leaves
 /// chance, and points that match it would only confirm the prediction. Single points tell.
 bool SurfelMap::is_surface(const Parent& parent, const PlaneFit& plane) const {
   int on_plane = 0;
-  const int count = std::popcount(parent.occupied);
-  for (int i = 0; i < count; ++i) {
-    const Leaf& leaf = leaves_[parent.first_leaf + static_cast<std::uint32_t>(i)];
+  for (const Leaf& leaf : leaves_of(parent)) {
     const double distance_m = plane.normal.dot(metres(leaf.point) - plane.centroid);
     on_plane += std::abs(distance_m) < kOnPlane_m ? 1 : 0;
   }
-  return on_plane >= kSurfaceShare * count;
+  return on_plane >= kSurfaceShare * std::popcount(parent.occupied);
 }
 
 SurfelMap::Window SurfelMap::window_of(const Parent& parent) const {

@@ -3,6 +3,7 @@
 #include "trigpoint/pipeline/past_beside.hpp"
 
 #include "trigpoint/base/serial_worker.hpp"
+#include "trigpoint/export/correct_session.hpp"
 #include "trigpoint/export/session.hpp"
 #include "trigpoint/lio_mapper/keyframe_store.hpp"
 #include "trigpoint/lio_mapper/past.hpp"
@@ -95,30 +96,8 @@ struct Outcome {
 }  // namespace
 
 GraphInput stored_past(const std::string& session) {
-  namespace file = exporter::session_file;
-  GraphInput past;
-  const std::string store = exporter::path_in(session, file::kKeyframes);
-  if (!std::filesystem::exists(store)) {
-    return past;
-  }
-  KeyframeReader reader(store);
-  reader.visit_places([&](const lio_mapper::Keyframe& k) {
-    past.keyframes.push_back({k.stamp_ns, k.odom_epoch, k.T_odom_base, k.aligned, k.T_map_odom});
-  });
-  reader.visit_rows([&](const lio_mapper::StoredRow& row) { past.rows.push_back(row); });
-  const std::string lio = exporter::path_in(session, file::kLio);
-  if (past.keyframes.empty() || !std::filesystem::exists(lio)) {
-    return past;
-  }
-  std::size_t next = 0;  // an epoch begins with a keyframe
-  for (const exporter::StampedPose& pose : exporter::read_trajectory(lio)) {
-    while (next < past.keyframes.size() && past.keyframes[next].stamp_ns <= pose.stamp_ns) {
-      ++next;
-    }
-    past.trajectory.push_back(
-        {pose.stamp_ns, past.keyframes[next == 0 ? 0 : next - 1].odom_epoch, pose.pose});
-  }
-  return past;
+  const std::string store = exporter::path_in(session, exporter::session_file::kKeyframes);
+  return std::filesystem::exists(store) ? exporter::graph_input_of(session) : GraphInput{};
 }
 
 struct PastBeside::Impl {

@@ -166,7 +166,7 @@ TEST(IteratedUpdate, reports_directions_that_nobody_saw) {
 /// Three walls of a room.
 class RoomMap final : public LocalMap {
  public:
-  bool match(const Eigen::Vector3d& p, PlaneMatch& plane) const override {
+  bool match_surface(const Eigen::Vector3d& p, PlaneMatch& plane) const override {
     int axis = 0;
     (p - Eigen::Vector3d(10.0, 8.0, -2.0)).cwiseAbs().minCoeff(&axis);
     plane.normal = Eigen::Vector3d::Unit(axis);

@@ -88,13 +88,19 @@ double largest_step_m(const std::vector<Odometry>& poses) {
   return largest_m;
 }
 
-void adopt_corrected(Drive& drive) {
+void expect_adopted(Drive& drive, CorrectedMap& corrected) {
+  ASSERT_TRUE(drive.mapper.adopt(corrected));
+}
+
+/// A snapshot is corrected at once, and what comes of it is given to `adopt` later in the drive.
+void adopt_corrected(Drive& drive,
+                     const std::function<void(Drive&, CorrectedMap&)>& adopt = expect_adopted) {
   std::optional<CorrectedMap> corrected;
   drive.run([&](int sweep) {
     if (sweep == kSnapshotSweep) {
       corrected = drive.correct(drive.mapper.past_snapshot());
     } else if (sweep == kAdoptSweep) {
-      ASSERT_TRUE(drive.mapper.adopt(*corrected));
+      adopt(drive, *corrected);
     }
   });
 }
@@ -115,20 +121,15 @@ TEST(MapperPast, does_not_step_when_the_map_is_exchanged) {
 }
 
 TEST(MapperPast, changes_no_pose_and_no_covariance_itself) {
-  Drive drive;
-  std::optional<CorrectedMap> corrected;
-  drive.run([&](int sweep) {
-    if (sweep == kSnapshotSweep) {
-      corrected = drive.correct(drive.mapper.past_snapshot());
-    } else if (sweep == kAdoptSweep) {
-      const auto before = drive.mapper.checkpoint();
-      ASSERT_TRUE(drive.mapper.adopt(*corrected));
-      const auto after = drive.mapper.checkpoint();
-      EXPECT_EQ(before->T_odom_base.p, after->T_odom_base.p);
-      EXPECT_EQ(before->T_odom_base.q.coeffs(), after->T_odom_base.q.coeffs());
-      EXPECT_EQ(before->T_map_odom.p, after->T_map_odom.p);
-      EXPECT_EQ(before->covariance, after->covariance);
-    }
+  Drive driven;
+  adopt_corrected(driven, [](Drive& drive, CorrectedMap& corrected) {
+    const auto before = drive.mapper.checkpoint();
+    ASSERT_TRUE(drive.mapper.adopt(corrected));
+    const auto after = drive.mapper.checkpoint();
+    EXPECT_EQ(before->T_odom_base.p, after->T_odom_base.p);
+    EXPECT_EQ(before->T_odom_base.q.coeffs(), after->T_odom_base.q.coeffs());
+    EXPECT_EQ(before->T_map_odom.p, after->T_map_odom.p);
+    EXPECT_EQ(before->covariance, after->covariance);
   });
 }
 
@@ -180,16 +181,11 @@ TEST(MapperPast, holds_the_points_that_came_since_the_snapshot) {
 }
 
 TEST(MapperPast, gives_the_old_map_back_to_be_disposed_of) {
-  Drive drive;
-  std::optional<CorrectedMap> corrected;
-  drive.run([&](int sweep) {
-    if (sweep == kSnapshotSweep) {
-      corrected = drive.correct(drive.mapper.past_snapshot());
-    } else if (sweep == kAdoptSweep) {
-      const PointCloud old = drive.mapper.local_map();
-      ASSERT_TRUE(drive.mapper.adopt(*corrected));
-      EXPECT_TRUE(same_points(corrected->map().points(), old));
-    }
+  Drive driven;
+  adopt_corrected(driven, [](Drive& drive, CorrectedMap& corrected) {
+    const PointCloud old = drive.mapper.local_map();
+    ASSERT_TRUE(drive.mapper.adopt(corrected));
+    EXPECT_TRUE(same_points(corrected.map().points(), old));
   });
 }
 

@@ -20,10 +20,6 @@ class Room final : public LocalMap {
  public:
   explicit Room(bool ends) : ends_(ends) {}
 
-  bool match(const Eigen::Vector3d& p, PlaneMatch& plane) const override {
-    return match_surface(p, plane) || match_nearest(p, plane);
-  }
-
   bool match_surface(const Eigen::Vector3d& p, PlaneMatch& plane) const override {
     ++surfaces_asked;
     Eigen::Index axis = 0;

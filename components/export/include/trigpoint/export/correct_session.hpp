@@ -4,7 +4,6 @@
 #pragma once
 
 #include "trigpoint/export/session.hpp"
-#include "trigpoint/lio_mapper/lio_mapper.hpp"
 #include "trigpoint/lio_mapper/pose_graph.hpp"
 
 #include <Eigen/Core>
@@ -29,9 +28,6 @@ struct PastSettings {
 };
 
 PastSettings past_settings_of(const std::string& session);
-
-/// What the pose graph needs of a keyframe: all but its points.
-lio_mapper::GraphKeyframe graph_keyframe_of(const lio_mapper::Keyframe& keyframe);
 
 /// Keyframes, rows, lio.tum and the alignment of a session.
 lio_mapper::GraphInput graph_input_of(const std::string& session);

@@ -107,9 +107,9 @@ class LioMapper {
   /// The points that have entered the local map since the snapshot or the last call, scan by scan.
   std::vector<PointCloud> take_inserted();
   /// Matches against `corrected` from the next scan on; what take_inserted() would give is inserted
-  /// first. Where nothing has changed the map stays. Poses do not change. Afterwards `corrected` holds the old map, to be disposed of
-  /// wherever that disturbs nobody. False, and nothing happens, when it is of another odom epoch or
-  /// came too late.
+  /// first. Where nothing has changed the map stays. Poses do not change. Afterwards `corrected`
+  /// holds the old map, to be disposed of wherever that disturbs nobody. False, and nothing
+  /// happens, when it is of another odom epoch or came too late.
   bool adopt(CorrectedMap& corrected);
   /// Nothing came of it.
   void forget_snapshot();

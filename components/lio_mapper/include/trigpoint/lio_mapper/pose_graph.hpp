@@ -30,6 +30,11 @@ struct GraphKeyframe {
   YawPose T_map_odom;  ///< at that time; its tilt counts also when not aligned
 };
 
+struct Keyframe;
+
+/// All but its points.
+GraphKeyframe graph_keyframe_of(const Keyframe& keyframe);
+
 struct OdomSample {
   Nanoseconds stamp_ns{0};
   std::uint32_t odom_epoch{0};
@@ -74,6 +79,7 @@ struct PoseGraphOptions {
   std::size_t search_from{0};
   double loop_every_m{4.0};      ///< driven, between keyframes that look for one
   double loop_radius_m{10.0};    ///< in xy, of the present estimate
+  double loop_height_m{4.0};     ///< beyond it lies another storey of a car park
   double loop_apart_m{60.0};     ///< driven between its ends
   double loop_half_map_m{12.0};  ///< driven to either side of the place that is matched against
   double min_overlap{0.4};       ///< of the scan's points, those that meet a plane there
