@@ -36,6 +36,16 @@ void add_noise(const Vector3d& normal, double weighted_tilt2, Eigen::Matrix3d& n
   noise.diagonal().array() += weighted_tilt2;
 }
 
+/// All of the matrix: half of it takes longer.
+template <int Size>
+void add_row(const typename Information<Size>::Vector& h,
+             double weight,
+             double residual_m,
+             Information<Size>& sum) {
+  sum.information.noalias() += (weight * h) * h.transpose();
+  sum.gradient += weight * residual_m * h;
+}
+
 /// Normals are measured too. Along a tunnel none has a true component, but their noise has one, and
 /// its squares add up to information that is none: least squares with noisy regressors, which holds
 /// the estimate back at the prediction and makes it look certain [W. A. Fuller, Measurement Error
@@ -155,8 +165,7 @@ void ScanMatcher::add(Residual& r, const Viewpoint& view, PoseInformation& sum) 
   // d(n . R exp(e) p) / de = (p x R^T n)^T
   Vector6d h;
   h << r.plane.normal, r.point_base_m.cross(normal_base);
-  sum.information.selfadjointView<Eigen::Lower>().rankUpdate(h, weight);
-  sum.gradient += weight * r.residual_m * h;
+  add_row(h, weight, r.residual_m, sum);
   sum.weight_per_m2 += weight;
   sum.weighted_thickness2 += weight * r.plane.thickness2_m2;
   ++sum.count;
@@ -193,8 +202,7 @@ void ScanMatcher::add(Residual& r, const Viewpoint& view, PoseAndExtrinsicInform
   const double weight = weight_of(r, normal_base.dot(r.direction_base));
   h.segment<3>(error::kPosition) = normal;
   h.segment<3>(error::kRotation) = point_base_m.cross(normal_base);
-  sum.information.selfadjointView<Eigen::Lower>().rankUpdate(h, weight);
-  sum.gradient += weight * r.residual_m * h;
+  add_row(h, weight, r.residual_m, sum);
   sum.weight_per_m2 += weight;
   sum.weighted_thickness2 += weight * r.plane.thickness2_m2;
   ++sum.count;
@@ -229,9 +237,7 @@ Information<Size> ScanMatcher::sum_of_all(const Viewpoint& view,
   const double scale = std::min(
       1.0,
       config_.independent_residuals / static_cast<double>(std::max<std::size_t>(sum.count, 1)));
-  sum.information = (scale * typename Information<Size>::Matrix(
-                                 sum.information.template selfadjointView<Eigen::Lower>()))
-                        .eval();
+  sum.information *= scale;
   sum.gradient *= scale;
   sum.noise *= scale;
   take_out_noise(sum);
