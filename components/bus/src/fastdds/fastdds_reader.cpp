@@ -2,25 +2,16 @@
 // Copyright the Trigpoint developers
 #include "fastdds_reader.hpp"
 
+#include "../message_info.hpp"
 #include "endpoint.hpp"
 #include "wire_type.hpp"
 
-#include <chrono>
 #include <stdexcept>
 #include <utility>
 
 namespace trigpoint::bus::fastdds {
 
 namespace dds = eprosima::fastdds::dds;
-
-namespace {
-
-Nanoseconds wall_clock_ns() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(now).count();
-}
-
-}  // namespace
 
 FastReader::FastReader(FastNode& node,
                        const backend::TypeOps& type,

@@ -40,7 +40,7 @@ PointCloudMessage two_megabytes(std::uint32_t number) {
   return cloud;
 }
 
-// First: fork must come before Fast DDS has threads, also when all tests run in one process.
+// First: fork must come before the middleware has threads, also when all tests run in one process.
 /// A process that publishes on gps/fix until it is killed.
 pid_t start_publisher(const Config& config) {
   const pid_t child = fork();
