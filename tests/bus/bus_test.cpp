@@ -150,6 +150,11 @@ TEST_P(Bus, tells_writers_apart_by_their_guid) {
   EXPECT_EQ(first.guid().size(), 32U);
 }
 
+TEST_P(Bus, tells_the_process_of_a_writer) {
+  const std::string guid = carry(topics::fix, numbered_fix(1)).info.writer_guid;
+  EXPECT_EQ(there.process_of(guid), static_cast<unsigned>(getpid()));
+}
+
 TEST_P(Bus, gives_a_late_joiner_the_newest_datum) {
   Publisher publisher(here, topics::datum);
   publisher.publish(to_message(Datum{1.0, 2.0, 3.0, 4}));

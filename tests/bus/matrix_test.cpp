@@ -88,6 +88,7 @@ TEST_P(Topics, arrive_with_every_field) {
     ASSERT_TRUE(writers.wait_for(1));
     expect_equal_message(heard.items().front().first, sent);
     EXPECT_EQ(heard.items().front().second, writers.items().front());
+    EXPECT_EQ(participant.process_of(writers.items().front()), static_cast<unsigned>(writer.pid()));
     EXPECT_EQ(subscription.malformed(), 0U);
   });
 }

@@ -2,11 +2,14 @@
 // Copyright the Trigpoint developers
 #include "cyclone_node.hpp"
 
+#include "../process_note.hpp"
 #include "cyclone_reader.hpp"
 #include "cyclone_writer.hpp"
 #include "domain_config.hpp"
 #include "endpoint.hpp"
 
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <stdexcept>
 #include <utility>
@@ -39,6 +42,8 @@ CycloneNode::CycloneNode(const Config& config, const std::string& name, EventSin
   domain_ = checked(dds_create_domain(id, domain_config(config, buffers).c_str()), what);
   const QosPointer qos(dds_create_qos());
   dds_qset_entity_name(qos.get(), name.c_str());
+  const std::string note = process_note();
+  dds_qset_userdata(qos.get(), note.data(), note.size());
   participant_ = dds_create_participant(id, qos.get(), nullptr);
   if (participant_ < 0) {
     dds_delete(domain_);
@@ -48,6 +53,33 @@ CycloneNode::CycloneNode(const Config& config, const std::string& name, EventSin
 
 CycloneNode::~CycloneNode() {
   dds_delete(domain_);
+}
+
+/// Cyclone keeps what participants say of themselves for whoever reads this topic.
+std::optional<unsigned> CycloneNode::process_of(const std::string& writer_guid) {
+  constexpr std::uint32_t kMost = 256;
+  const dds_entity_t reader =
+      dds_create_reader(participant_, DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr, nullptr);
+  std::array<void*, kMost> samples{};
+  std::array<dds_sample_info_t, kMost> infos{};
+  const dds_return_t count = dds_read(reader, samples.data(), infos.data(), kMost, kMost);
+  std::optional<unsigned> found;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(std::max(count, 0)) && !found; ++i) {
+    const auto& told = *static_cast<const dds_builtintopic_participant_t*>(samples[i]);
+    if (participant_of(guid_text(told.key)) == participant_of(writer_guid)) {
+      void* data = nullptr;
+      std::size_t size = 0;
+      if (infos[i].valid_data && dds_qget_userdata(told.qos, &data, &size)) {
+        found = noted_process({static_cast<const std::uint8_t*>(data), size});
+        dds_free(data);
+      }
+    }
+  }
+  if (count > 0) {
+    dds_return_loan(reader, samples.data(), count);
+  }
+  dds_delete(reader);
+  return found ? found : process_in_fastdds_guid(writer_guid);
 }
 
 void CycloneNode::tell(const Event& event) const {

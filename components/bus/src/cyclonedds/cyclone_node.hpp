@@ -32,6 +32,8 @@ class CycloneNode : public backend::Node {
                                                backend::Deliver deliver,
                                                SubscriptionEvents events) override;
 
+  std::optional<unsigned> process_of(const std::string& writer_guid) override;
+
   dds_entity_t participant() const { return participant_; }
 
   Worker& worker() { return worker_; }
