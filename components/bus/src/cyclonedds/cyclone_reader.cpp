@@ -3,6 +3,7 @@
 #include "cyclone_reader.hpp"
 
 #include "../message_info.hpp"
+#include "../reader_events.hpp"
 #include "endpoint.hpp"
 
 #include <array>
@@ -91,12 +92,14 @@ void CycloneReader::take_all() {
 }
 
 void CycloneReader::deliver(const WireData& data, const dds_sample_info_t& info) {
-  if (!type_.deserialize(data.cdr(), message_.get())) {
-    ++malformed_;
-    return;
-  }
   MessageInfo told;
   told.writer_guid = guid_of_writer(info.publication_handle);
+  if (!type_.deserialize(data.cdr(), message_.get())) {
+    if (const auto event = malformed_event(dds_topic_, told.writer_guid, ++malformed_)) {
+      node_.tell(*event);
+    }
+    return;
+  }
   told.source_stamp_ns = info.source_timestamp;
   told.reception_stamp_ns = wall_clock_ns();
   deliver_(message_.get(), told);
@@ -176,12 +179,7 @@ void CycloneReader::make_anew_as_best_effort() {
   reader_ = create();
   update_writers();
   take_all();
-  node_.tell({Severity::kWarning,
-              0,
-              "bus_reader_best_effort",
-              "a writer on " + dds_topic_ +
-                  " offers only BEST_EFFORT; our reader now asks for no more, and samples that the "
-                  "network loses stay lost"});
+  node_.tell(best_effort_event(dds_topic_));
 }
 
 }  // namespace trigpoint::bus::cyclonedds
