@@ -40,6 +40,11 @@ Buffer BufferPool::take_kept(std::size_t size) {
   return buffer;
 }
 
+std::size_t BufferPool::kept_bytes() {
+  const std::lock_guard lock(mutex_);
+  return kept_bytes_;
+}
+
 void BufferPool::give_back(Buffer buffer) {
   if (buffer.capacity < kLarge_bytes || buffer.capacity > kMostKept_bytes) {
     return;

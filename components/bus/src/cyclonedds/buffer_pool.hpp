@@ -22,6 +22,9 @@ class BufferPool {
   Buffer take(std::size_t size);
   void give_back(Buffer buffer);
 
+  /// Capacity of what waits for its next use.
+  std::size_t kept_bytes();
+
  private:
   Buffer take_kept(std::size_t size);
 
