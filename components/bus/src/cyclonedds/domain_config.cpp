@@ -114,18 +114,16 @@ std::string internal(const Config& config, const SocketBuffers& buffers) {
   const std::string heartbeat = milliseconds(config.heartbeat_s);
   const std::string repair_burst =
       element("BurstSize", element("MaxRexmit", paced_portion_bytes(buffers), "B"));
-  return element("Internal",
-                 buffer("SocketReceiveBufferSize", buffers.receive_bytes) +
-                     buffer("SocketSendBufferSize", buffers.send_bytes) +
-                     "<HeartbeatInterval minsched=\"" + heartbeat + "\" max=\"" + heartbeat +
-                     "\">" + heartbeat + "</HeartbeatInterval>" + element("NackDelay", "10ms") +
-                     element("AutoReschedNackDelay", heartbeat) +
-                     // A slow reader loses samples, as KEEP_LAST says; it does not stop the writer.
-                     element("Watermarks",
-                             element("WhcAdaptive", "false") + element("WhcHigh", "2000MB") +
-                                 element("WhcHighInit", "2000MB")) +
-                     element("MaxSampleSize", kLargestMessage_bytes, "B") +
-                     (is_small(buffers) ? repair_burst : ""));
+  return element(
+      "Internal",
+      buffer("SocketReceiveBufferSize", buffers.receive_bytes) +
+          buffer("SocketSendBufferSize", buffers.send_bytes) + "<HeartbeatInterval minsched=\"" +
+          heartbeat + "\" max=\"" + heartbeat + "\">" + heartbeat + "</HeartbeatInterval>" +
+          element("NackDelay", "10ms") + element("AutoReschedNackDelay", heartbeat) +
+          // For the last samples of a writer that goes; longer would add up where readers are dead.
+          element("WriterLingerDuration", "100ms") +
+          element("MaxSampleSize", kLargestMessage_bytes, "B") +
+          (is_small(buffers) ? repair_burst : ""));
 }
 
 }  // namespace
