@@ -1,5 +1,9 @@
 # Functions that every component uses, so that targets look alike.
 
+# The programs of the bus and the tests labelled bus or system: what a second vendor changes, so what
+# `tests/run --bus` builds and runs. All else never sees a vendor.
+add_custom_target(trigpoint_on_the_bus)
+
 # Warnings for our own code; third-party headers come in as SYSTEM.
 # -Wno-restrict: g++ 12 reports string concatenation falsely (GCC bug 105651).
 function(trigpoint_warnings target)
@@ -33,6 +37,36 @@ function(trigpoint_program name)
   install(TARGETS ${name})
 endfunction()
 
+# trigpoint_bus_program(<name> SOURCES ... LIBS ... [OUTPUT_NAME ...] [DEFINITIONS ...]): a program on
+# the bus, installed as TRIGPOINT_DDS says. For the tests it is there once more in bin/<vendor> for
+# each other vendor: compiled once, linked again, so TRIGPOINT_BIN=bin/<vendor> runs the job on it.
+function(trigpoint_bus_program name)
+  cmake_parse_arguments(ARG "" "OUTPUT_NAME" "SOURCES;LIBS;DEFINITIONS" ${ARGN})
+  if(NOT ARG_OUTPUT_NAME)
+    set(ARG_OUTPUT_NAME ${name})
+  endif()
+  add_library(${name}_objects OBJECT ${ARG_SOURCES})
+  target_link_libraries(${name}_objects PRIVATE ${ARG_LIBS} trigpoint::bus_core)
+  target_compile_definitions(${name}_objects PRIVATE ${ARG_DEFINITIONS})
+  trigpoint_warnings(${name}_objects)
+  trigpoint_program(${name} SOURCES $<TARGET_OBJECTS:${name}_objects> LIBS ${ARG_LIBS} trigpoint::bus)
+  set_target_properties(${name} PROPERTIES OUTPUT_NAME ${ARG_OUTPUT_NAME} LINKER_LANGUAGE CXX)
+  if(NOT TRIGPOINT_BUILD_TESTS)
+    return()
+  endif()
+  set_property(GLOBAL APPEND PROPERTY TRIGPOINT_BUS_PROGRAMS_${TRIGPOINT_DDS} ${name})
+  add_dependencies(trigpoint_on_the_bus ${name})
+  foreach(vendor ${TRIGPOINT_DDS_VENDORS})
+    if(TARGET trigpoint::bus_${vendor} AND NOT vendor STREQUAL TRIGPOINT_DDS)
+      add_executable(${name}_${vendor} $<TARGET_OBJECTS:${name}_objects>)
+      target_link_libraries(${name}_${vendor} PRIVATE ${ARG_LIBS} trigpoint::bus_${vendor})
+      set_target_properties(${name}_${vendor} PROPERTIES OUTPUT_NAME ${ARG_OUTPUT_NAME} LINKER_LANGUAGE CXX
+                            RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin/${vendor})
+      set_property(GLOBAL APPEND PROPERTY TRIGPOINT_BUS_PROGRAMS_${vendor} ${name}_${vendor})
+    endif()
+  endforeach()
+endfunction()
+
 # trigpoint_test(<name> SOURCES ... LIBS ... [LABELS ...] [TIMEOUT s]): one GoogleTest binary in
 # bin/, each TEST a ctest of its own, or all as one with WHOLE (then it runs alone). The label "long"
 # keeps a test out of the default run.
@@ -52,6 +86,9 @@ function(trigpoint_test name)
   target_compile_definitions(${name} PRIVATE TRIGPOINT_SHARED_DATA="${TRIGPOINT_SHARED_DATA}" TRIGPOINT_SOURCE_DIR="${PROJECT_SOURCE_DIR}" TRIGPOINT_BIN_DIR="${CMAKE_BINARY_DIR}/bin")
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
   trigpoint_warnings(${name})
+  if("bus" IN_LIST ARG_LABELS OR "system" IN_LIST ARG_LABELS)
+    add_dependencies(trigpoint_on_the_bus ${name})
+  endif()
   if(ARG_WHOLE)
     add_test(NAME ${name} COMMAND ${name})
     set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}" RUN_SERIAL ON)

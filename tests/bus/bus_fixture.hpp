@@ -5,12 +5,16 @@
 
 #include "trigpoint/bus/bus.hpp"
 
+#include <fcntl.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <chrono>
 #include <condition_variable>
+#include <filesystem>
 #include <functional>
 #include <mutex>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -20,11 +24,26 @@ namespace trigpoint::bus::testing {
 // Far above anything a loaded machine needs; only a broken bus waits so long.
 inline constexpr std::chrono::seconds kForever{30};
 
-/// ctest runs every test in a process of its own, so neighbours differ.
-inline Config own_domain() {
+/// A domain that no other test on this computer has, as long as this process lives.
+inline int locked_domain() {
   constexpr int kDomains = 100;  // 1 to 100; above 101 the ports are not ours
+  for (int attempt = 0; attempt < kDomains; ++attempt) {
+    const int domain = 1 + (getpid() + attempt) % kDomains;
+    const auto file = std::filesystem::temp_directory_path() /
+                      ("trigpoint-test-domain-" + std::to_string(domain) + ".lock");
+    const int lock = open(file.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666);
+    if (lock >= 0 && flock(lock, LOCK_EX | LOCK_NB) == 0) {
+      return domain;  // the lock ends with the process
+    }
+    close(lock);
+  }
+  throw std::runtime_error("all DDS domains are taken by other tests");
+}
+
+inline Config own_domain() {
+  static const int domain = locked_domain();
   Config config;
-  config.domain_id = 1 + getpid() % kDomains;
+  config.domain_id = domain;
   config.network_interface = "lo";
   return config;
 }

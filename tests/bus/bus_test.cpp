@@ -150,6 +150,11 @@ TEST_P(Bus, tells_writers_apart_by_their_guid) {
   EXPECT_EQ(first.guid().size(), 32U);
 }
 
+TEST_P(Bus, tells_the_process_of_a_writer) {
+  const std::string guid = carry(topics::fix, numbered_fix(1)).info.writer_guid;
+  EXPECT_EQ(there.process_of(guid), static_cast<unsigned>(getpid()));
+}
+
 TEST_P(Bus, gives_a_late_joiner_the_newest_datum) {
   Publisher publisher(here, topics::datum);
   publisher.publish(to_message(Datum{1.0, 2.0, 3.0, 4}));
@@ -277,15 +282,15 @@ TEST_P(Bus, takes_and_gives_serialised_messages) {
   EXPECT_EQ(got, sent);
 }
 
-TEST_P(Bus, counts_malformed_messages_and_goes_on) {
+TEST_P(Bus, counts_and_tells_malformed_messages_and_goes_on) {
   Collected<int> heard;
   Readers readers;
   Subscription<sensor_msgs::msg::NavSatFix> subscription(
-      there, topics::fix, [&](const auto& fix, const MessageInfo&) {
+      here, topics::fix, [&](const auto& fix, const MessageInfo&) {
         heard.add(fix.status().service());
       });
   SerializedPublisher sender(
-      here, "gps/fix", "sensor_msgs/msg/NavSatFix", qos::kDefault, readers.events());
+      there, "gps/fix", "sensor_msgs/msg/NavSatFix", qos::kDefault, readers.events());
   ASSERT_TRUE(readers.wait_for(1));
   SerializedMessage truncated = encode_cdr(samples::fix());
   truncated.resize(40);
@@ -294,6 +299,9 @@ TEST_P(Bus, counts_malformed_messages_and_goes_on) {
   ASSERT_TRUE(heard.wait_for(1));
   EXPECT_EQ(heard.items(), std::vector{9});
   EXPECT_EQ(subscription.malformed(), 1U);
+  ASSERT_EQ(events.size(), 1U);
+  EXPECT_EQ(events.items()[0].code, "bus_malformed_message");
+  EXPECT_THAT(events.items()[0].text, ::testing::HasSubstr("rt/gps/fix"));
 }
 
 TEST_P(Bus, calls_nobody_back_after_the_subscription_is_gone) {

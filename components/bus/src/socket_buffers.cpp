@@ -20,6 +20,10 @@ std::int64_t granted_bytes(int probe, int option, std::int64_t wanted_bytes) {
   return std::min<std::int64_t>(doubled / 2, wanted_bytes);
 }
 
+std::int64_t smaller_bytes(const SocketBuffers& granted) {
+  return std::min(granted.receive_bytes, granted.send_bytes);
+}
+
 }  // namespace
 
 SocketBuffers permitted_socket_buffers(std::int64_t wanted_bytes) {
@@ -33,17 +37,25 @@ SocketBuffers permitted_socket_buffers(std::int64_t wanted_bytes) {
   return granted;
 }
 
+bool is_small(const SocketBuffers& granted) {
+  return smaller_bytes(granted) < kUnpacedBufferBytes;
+}
+
+std::int64_t paced_portion_bytes(const SocketBuffers& granted) {
+  constexpr std::int64_t kLeast_bytes = 65'536;
+  return std::max(smaller_bytes(granted) * 2 / 3, kLeast_bytes);
+}
+
 std::optional<Event> socket_buffer_warning(std::int64_t wanted_bytes,
                                            const SocketBuffers& granted) {
-  const std::int64_t smaller = std::min(granted.receive_bytes, granted.send_bytes);
-  if (smaller >= kUnpacedBufferBytes) {
+  if (!is_small(granted)) {
     return std::nullopt;
   }
   return Event{Severity::kWarning,
                0,
                "bus_small_socket_buffers",
-               "socket buffers are " + std::to_string(smaller) + " bytes (asked for " +
-                   std::to_string(wanted_bytes) + ", wanted at least " +
+               "socket buffers are " + std::to_string(smaller_bytes(granted)) +
+                   " bytes (asked for " + std::to_string(wanted_bytes) + ", wanted at least " +
                    std::to_string(kUnpacedBufferBytes) +
                    "); point clouds are sent paced. To raise them: sysctl -w "
                    "net.core.rmem_max=4194304 net.core.wmem_max=4194304"};

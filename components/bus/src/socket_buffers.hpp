@@ -5,6 +5,7 @@
 
 #include "trigpoint/base/event.hpp"
 
+#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -21,6 +22,14 @@ SocketBuffers permitted_socket_buffers(std::int64_t wanted_bytes);
 
 /// Below this, clouds are sent in paced portions: a burst of one cloud no longer fits.
 inline constexpr std::int64_t kUnpacedBufferBytes = 4'000'000;
+
+/// Whether clouds must be paced.
+bool is_small(const SocketBuffers& granted);
+
+/// How much a participant sends of its clouds each period: what fits the smaller buffer with room
+/// for everything else (71 MB/s at 212992 bytes).
+std::int64_t paced_portion_bytes(const SocketBuffers& granted);
+inline constexpr std::chrono::milliseconds kPacingPeriod{2};
 
 /// The warning and its remedy, when the buffers are smaller than unpaced clouds need.
 std::optional<Event> socket_buffer_warning(std::int64_t wanted_bytes, const SocketBuffers& granted);

@@ -2,10 +2,8 @@
 // Copyright the Trigpoint developers
 #include "bus_guard.hpp"
 
-#include "bus_survey.hpp"
 #include "known_topics.hpp"
 
-#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <fstream>
@@ -71,7 +69,9 @@ BusFindings look_for_writers(const SystemConfig& config, Guarded guarded) {
   for (const recording::TopicSurvey& survey : surveys) {
     std::set<std::string> owners;
     for (const auto& guids : {survey.writers, survey.silent_writers}) {
-      std::transform(guids.begin(), guids.end(), std::inserter(owners, owners.end()), owner_of);
+      for (const std::string& guid : guids) {
+        owners.insert(owner_of(guid, survey));
+      }
     }
     std::string list;
     for (const std::string& owner : owners) {
@@ -93,17 +93,11 @@ std::string refusal(const BusFindings& findings, const SystemConfig& config) {
   return text + "Both would be mixed: end them, or take another domain (ROS_DOMAIN_ID=N).";
 }
 
-std::string owner_of(const std::string& writer_guid) {
-  // Fast DDS: bytes 4 and 5 of a GUID are the low 16 bits of the process number, lowest first.
-  constexpr std::size_t kPidDigit = 8;
-  constexpr const char* kFastDds = "010f";
-  if (writer_guid.size() >= kPidDigit + 4 && writer_guid.starts_with(kFastDds)) {
-    const auto byte = [&](std::size_t digit) {
-      return static_cast<unsigned>(std::stoul(writer_guid.substr(digit, 2), nullptr, 16));
-    };
-    const unsigned number = byte(kPidDigit) + 256 * byte(kPidDigit + 2);
-    if (const std::string program = program_of(number); program.starts_with("trigpoint")) {
-      return program + " (process " + std::to_string(number) + ")";
+std::string owner_of(const std::string& writer_guid, const recording::TopicSurvey& survey) {
+  if (const auto process = survey.processes.find(writer_guid); process != survey.processes.end()) {
+    const std::string program = program_of(process->second);
+    if (program.starts_with("trigpoint")) {
+      return program + " (process " + std::to_string(process->second) + ")";
     }
   }
   return "another program (DDS writer " + writer_guid.substr(0, 24) + ")";

@@ -3,6 +3,7 @@
 // Two runs on one DDS domain mix their data without a word: looked for before anything is sent.
 #pragma once
 
+#include "bus_survey.hpp"
 #include "system_config.hpp"
 
 #include <string>
@@ -29,6 +30,6 @@ std::string refusal(const BusFindings& findings, const SystemConfig& config);
 
 /// The process that a DDS writer belongs to, as far as can be told on this computer: its program
 /// and number when that program is Trigpoint's, else "a program whose GUID is ...".
-std::string owner_of(const std::string& writer_guid);
+std::string owner_of(const std::string& writer_guid, const recording::TopicSurvey& survey);
 
 }  // namespace trigpoint::cli

@@ -43,11 +43,14 @@ class Listener {
     survey_.topic = topic;
   }
 
-  TopicSurvey result(double duration_s) {
+  TopicSurvey result(bus::Participant& participant, double duration_s) {
     survey_.rate_hz = static_cast<double>(survey_.messages) / duration_s;
     for (const std::string& writer : matched_) {
       if (!survey_.writers.contains(writer)) {
         survey_.silent_writers.insert(writer);
+      }
+      if (const auto process = participant.process_of(writer)) {
+        survey_.processes[writer] = *process;
       }
     }
     survey_.remarks = checks_.remarks();
@@ -95,7 +98,7 @@ std::vector<TopicSurvey> survey_bus(const SurveyOptions& options) {
   loop.run();
   std::vector<TopicSurvey> surveys;
   for (const auto& listener : listeners) {
-    surveys.push_back(listener->result(options.duration_s));
+    surveys.push_back(listener->result(participant, options.duration_s));
   }
   return surveys;
 }

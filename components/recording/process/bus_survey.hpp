@@ -10,6 +10,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <set>
 #include <string>
 #include <vector>
@@ -21,10 +22,11 @@ struct TopicSurvey {
   std::uint64_t messages{0};
   double rate_hz{0.0};
   std::uint64_t bytes{0};
-  std::set<std::string> writers;         ///< GUIDs of those who were heard
-  std::set<std::string> silent_writers;  ///< matched, but nothing came from them
-  std::set<std::string> refused;         ///< QoS policies for which a writer did not match
-  std::vector<std::string> remarks;      ///< wrong units, missing fields, frames: sentences
+  std::set<std::string> writers;              ///< GUIDs of those who were heard
+  std::set<std::string> silent_writers;       ///< matched, but nothing came from them
+  std::map<std::string, unsigned> processes;  ///< numbers of the writers' processes, where told
+  std::set<std::string> refused;              ///< QoS policies for which a writer did not match
+  std::vector<std::string> remarks;           ///< wrong units, missing fields, frames: sentences
 };
 
 struct SurveyOptions {

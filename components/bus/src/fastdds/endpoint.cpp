@@ -2,29 +2,12 @@
 // Copyright the Trigpoint developers
 #include "endpoint.hpp"
 
-#include <cstdint>
+#include "../message_info.hpp"
 
 namespace trigpoint::bus::fastdds {
 
-namespace {
-
-void append_hexadecimal(std::string& text, std::uint8_t byte) {
-  constexpr char kDigits[] = "0123456789abcdef";
-  text.push_back(kDigits[byte >> 4]);
-  text.push_back(kDigits[byte & 15]);
-}
-
-}  // namespace
-
 std::string guid_text(const eprosima::fastrtps::rtps::GUID_t& guid) {
-  std::string text;
-  for (const std::uint8_t byte : guid.guidPrefix.value) {
-    append_hexadecimal(text, byte);
-  }
-  for (const std::uint8_t byte : guid.entityId.value) {
-    append_hexadecimal(text, byte);
-  }
-  return text;
+  return hexadecimal(guid.guidPrefix.value) + hexadecimal(guid.entityId.value);
 }
 
 std::string policy_name(eprosima::fastdds::dds::QosPolicyId_t policy) {

@@ -2,6 +2,8 @@
 // Copyright the Trigpoint developers
 #include "fastdds_node.hpp"
 
+#include "../process_note.hpp"
+#include "endpoint.hpp"
 #include "fastdds_reader.hpp"
 #include "fastdds_writer.hpp"
 #include "transport.hpp"
@@ -43,9 +45,12 @@ FastNode::FastNode(const Config& config, const std::string& name, EventSink sink
   dds::DomainParticipantQos qos;
   factory->get_default_participant_qos(qos);
   qos.name(name);
+  const std::string note = process_note();
+  qos.user_data().data_vec({note.begin(), note.end()});
   set_transport(qos, config, buffers);
   const int domain = domain_of(config);
-  participant_ = factory->create_participant(static_cast<dds::DomainId_t>(domain), qos);
+  participant_ = factory->create_participant(
+      static_cast<dds::DomainId_t>(domain), qos, this, dds::StatusMask::none());
   if (participant_ == nullptr) {
     throw std::runtime_error("cannot join DDS domain " + std::to_string(domain) +
                              "; are its UDP ports (from 7400 + 250 x domain) free, and is there a "
@@ -56,8 +61,28 @@ FastNode::FastNode(const Config& config, const std::string& name, EventSink sink
 }
 
 FastNode::~FastNode() {
+  participant_->set_listener(nullptr);
   participant_->delete_contained_entities();
   dds::DomainParticipantFactory::get_instance()->delete_participant(participant_);
+}
+
+void FastNode::on_participant_discovery(dds::DomainParticipant*,
+                                        eprosima::fastrtps::rtps::ParticipantDiscoveryInfo&& info) {
+  using Info = eprosima::fastrtps::rtps::ParticipantDiscoveryInfo;
+  const std::string guid = participant_of(guid_text(info.info.m_guid));
+  const std::lock_guard lock(processes_mutex_);
+  if (info.status == Info::REMOVED_PARTICIPANT || info.status == Info::DROPPED_PARTICIPANT) {
+    processes_.erase(guid);
+  } else if (const auto number = noted_process(info.info.m_userData)) {
+    processes_[guid] = *number;
+  }
+}
+
+std::optional<unsigned> FastNode::process_of(const std::string& writer_guid) {
+  const std::lock_guard lock(processes_mutex_);
+  const auto noted = processes_.find(participant_of(writer_guid));
+  return noted != processes_.end() ? std::optional(noted->second)
+                                   : process_in_fastdds_guid(writer_guid);
 }
 
 void FastNode::tell(const Event& event) const {

@@ -6,14 +6,16 @@
 
 #include "../worker.hpp"
 #include <fastdds/dds/domain/DomainParticipant.hpp>
+#include <fastdds/dds/domain/DomainParticipantListener.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 
+#include <map>
 #include <mutex>
 
 namespace trigpoint::bus::fastdds {
 
-class FastNode : public backend::Node {
+class FastNode : public backend::Node, private eprosima::fastdds::dds::DomainParticipantListener {
  public:
   FastNode(const Config& config, const std::string& name, EventSink sink);
   ~FastNode() override;
@@ -27,6 +29,7 @@ class FastNode : public backend::Node {
                                                const Qos& qos,
                                                backend::Deliver deliver,
                                                SubscriptionEvents events) override;
+  std::optional<unsigned> process_of(const std::string& writer_guid) override;
 
   eprosima::fastdds::dds::Publisher& publisher() { return *publisher_; }
 
@@ -41,11 +44,16 @@ class FastNode : public backend::Node {
   void tell(const Event& event) const;
 
  private:
+  void on_participant_discovery(eprosima::fastdds::dds::DomainParticipant* participant,
+                                eprosima::fastrtps::rtps::ParticipantDiscoveryInfo&& info) override;
+
   eprosima::fastdds::dds::Topic* topic(const std::string& dds_type, const std::string& dds_topic);
 
   const Config config_;
   const EventSink sink_;
   bool is_paced_{false};
+  std::mutex processes_mutex_;
+  std::map<std::string, unsigned> processes_;  ///< by the participant's part of a GUID
   std::mutex topics_mutex_;
   eprosima::fastdds::dds::DomainParticipant* participant_{nullptr};
   eprosima::fastdds::dds::Publisher* publisher_{nullptr};

@@ -2,25 +2,17 @@
 // Copyright the Trigpoint developers
 #include "fastdds_reader.hpp"
 
+#include "../message_info.hpp"
+#include "../reader_events.hpp"
 #include "endpoint.hpp"
 #include "wire_type.hpp"
 
-#include <chrono>
 #include <stdexcept>
 #include <utility>
 
 namespace trigpoint::bus::fastdds {
 
 namespace dds = eprosima::fastdds::dds;
-
-namespace {
-
-Nanoseconds wall_clock_ns() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(now).count();
-}
-
-}  // namespace
 
 FastReader::FastReader(FastNode& node,
                        const backend::TypeOps& type,
@@ -79,12 +71,14 @@ void FastReader::on_data_available(dds::DataReader* reader) {
 }
 
 void FastReader::deliver(const dds::SampleInfo& info, bool decoded) {
-  if (!decoded) {
-    ++malformed_;
-    return;
-  }
   MessageInfo told;
   told.writer_guid = guid_text(info.sample_identity.writer_guid());
+  if (!decoded) {
+    if (const auto event = malformed_event(topic_->get_name(), told.writer_guid, ++malformed_)) {
+      node_.tell(*event);
+    }
+    return;
+  }
   told.source_stamp_ns = info.source_timestamp.to_ns();
   told.reception_stamp_ns = wall_clock_ns();
   deliver_(message_.get(), told);
@@ -125,12 +119,7 @@ void FastReader::make_anew_as_best_effort() {
   remove(reader_);
   qos_.reliability = Reliability::kBestEffort;
   reader_ = create(qos_);
-  node_.tell({Severity::kWarning,
-              0,
-              "bus_reader_best_effort",
-              "a writer on " + topic_->get_name() +
-                  " offers only BEST_EFFORT; our reader now asks for no more, and samples that the "
-                  "network loses stay lost"});
+  node_.tell(best_effort_event(topic_->get_name()));
 }
 
 }  // namespace trigpoint::bus::fastdds

@@ -2,17 +2,15 @@
 // Copyright the Trigpoint developers
 #include "in_process.hpp"
 
+#include "../message_info.hpp"
+#include "../reader_events.hpp"
+
 #include <algorithm>
 #include <utility>
 
 namespace trigpoint::bus::in_process {
 
 namespace {
-
-Nanoseconds wall_clock_ns() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(now).count();
-}
 
 std::string next_guid() {
   constexpr std::size_t kDigits = 32;
@@ -163,13 +161,7 @@ void LocalReader::refused(const std::string& policy) {
     push_notice([this, policy] { events_.incompatible_qos(policy); });
   }
   if (policy == "RELIABILITY" && sink_) {
-    push_notice([this] {
-      sink_({Severity::kWarning,
-             0,
-             "bus_reader_best_effort",
-             "a writer on " + endpoint_.dds_topic +
-                 " offers only BEST_EFFORT; our reader now asks for no more"});
-    });
+    push_notice([this] { sink_(best_effort_event(endpoint_.dds_topic)); });
   }
 }
 
@@ -196,7 +188,10 @@ void LocalReader::work() {
 
 void LocalReader::deliver(const Parcel& parcel) {
   if (!type_.deserialize(*parcel.bytes, message_.get())) {
-    ++malformed_;
+    const auto event = malformed_event(endpoint_.dds_topic, parcel.info.writer_guid, ++malformed_);
+    if (event && sink_) {
+      sink_(*event);
+    }
     return;
   }
   MessageInfo info = parcel.info;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
 #include "in_process.hpp"
+#include <unistd.h>
 
 #include <utility>
 
@@ -32,6 +33,10 @@ class LocalNode : public backend::Node {
         std::move(deliver),
         std::move(events),
         sink_);
+  }
+
+  std::optional<unsigned> process_of(const std::string&) override {
+    return static_cast<unsigned>(getpid());
   }
 
  private:

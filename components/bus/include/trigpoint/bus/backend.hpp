@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -80,12 +81,14 @@ class Node {
                                               const Qos& qos,
                                               Deliver deliver,
                                               SubscriptionEvents events) = 0;
+  /// Of a matched writer, where that can be told; nobody says on which computer.
+  virtual std::optional<unsigned> process_of(const std::string& writer_guid) = 0;
 };
 
 /// Defined by the backend that is linked. Throws std::runtime_error with cause and remedy.
 std::unique_ptr<Node> make_node(const Config& config, const std::string& name, EventSink sink);
 
-/// "fastdds" or "in_process".
+/// "fastdds", "cyclonedds" or "in_process".
 const char* name();
 
 /// Defined for every message in topics.hpp.

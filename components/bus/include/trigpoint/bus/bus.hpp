@@ -31,6 +31,12 @@ class Participant {
 
   backend::Node& node() { return *node_; }
 
+  /// The number of the process that a matched writer belongs to, where it tells; it may run on
+  /// another computer.
+  std::optional<unsigned> process_of(const std::string& writer_guid) {
+    return node_->process_of(writer_guid);
+  }
+
  private:
   std::unique_ptr<backend::Node> node_;
 };

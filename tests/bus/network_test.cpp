@@ -40,7 +40,7 @@ PointCloudMessage two_megabytes(std::uint32_t number) {
   return cloud;
 }
 
-// First: fork must come before Fast DDS has threads, also when all tests run in one process.
+// First: fork must come before the middleware has threads, also when all tests run in one process.
 /// A process that publishes on gps/fix until it is killed.
 pid_t start_publisher(const Config& config) {
   const pid_t child = fork();
@@ -77,6 +77,42 @@ TEST(KilledProcess, is_noticed_within_its_lease) {
   ASSERT_TRUE(lost.wait_for(1));
   EXPECT_LE(std::chrono::steady_clock::now() - killed, kNoticeLimit);
   EXPECT_EQ(lost.items(), writers.items());
+}
+
+/// A process that hears points until it is killed.
+pid_t start_reader(const Config& config) {
+  const pid_t child = fork();
+  if (child == 0) {
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    Participant participant(config, "child");
+    Subscription<sensor_msgs::msg::PointCloud2> subscription(
+        participant, topics::points, [](const auto&, const MessageInfo&) {});
+    pause();
+  }
+  return child;
+}
+
+TEST(StoppedReader, holds_no_writer_back) {
+  constexpr int kClouds = 100;
+  constexpr auto kLimit = 5s;  // held back for 0.1 s each they would take 10 s
+  Config config = own_domain();
+  config.lease_s = 60.0;                     // the reader stays matched
+  const pid_t child = start_reader(config);  // before this process has threads
+  Participant participant(config, "parent");
+  Readers readers;
+  Publisher publisher(participant, topics::points, readers.events());
+  ASSERT_TRUE(readers.wait_for(1));
+  kill(child, SIGSTOP);
+  PointCloudMessage cloud = samples::cloud();
+  cloud.data.resize(200'000);
+  const auto begin = std::chrono::steady_clock::now();
+  for (int i = 0; i < kClouds; ++i) {
+    EXPECT_TRUE(publisher.publish(to_message(cloud)));
+  }
+  EXPECT_LE(std::chrono::steady_clock::now() - begin, kLimit);
+  EXPECT_EQ(publisher.matched(), 1);
+  kill(child, SIGKILL);
+  waitpid(child, nullptr, 0);
 }
 
 TEST(SmallBuffers, are_told_with_their_size_and_the_remedy) {

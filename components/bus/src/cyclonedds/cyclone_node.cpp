@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "cyclone_node.hpp"
+
+#include "../process_note.hpp"
+#include "cyclone_reader.hpp"
+#include "cyclone_writer.hpp"
+#include "domain_config.hpp"
+#include "endpoint.hpp"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <stdexcept>
+#include <utility>
+
+namespace trigpoint::bus {
+
+namespace cyclonedds {
+
+namespace {
+
+/// The number by which this process knows a Cyclone domain; on the network another one counts.
+dds_domainid_t next_private_id() {
+  static std::atomic<dds_domainid_t> last{1'000'000};
+  return ++last;
+}
+
+}  // namespace
+
+CycloneNode::CycloneNode(const Config& config, const std::string& name, EventSink sink)
+    : sink_(std::move(sink)) {
+  const SocketBuffers buffers = permitted_socket_buffers(config.socket_buffer_bytes);
+  if (const auto warning = socket_buffer_warning(config.socket_buffer_bytes, buffers)) {
+    paced_sender_ = std::make_unique<PacedSender>(paced_portion_bytes(buffers), kPacingPeriod);
+    tell(*warning);
+  }
+  const std::string what =
+      "cannot join DDS domain " + std::to_string(domain_of(config)) +
+      " (are its UDP ports, from 7400 + 250 x domain, free, and is there a network interface?)";
+  const dds_domainid_t id = next_private_id();
+  domain_ = checked(dds_create_domain(id, domain_config(config, buffers).c_str()), what);
+  const QosPointer qos(dds_create_qos());
+  dds_qset_entity_name(qos.get(), name.c_str());
+  const std::string note = process_note();
+  dds_qset_userdata(qos.get(), note.data(), note.size());
+  participant_ = dds_create_participant(id, qos.get(), nullptr);
+  if (participant_ < 0) {
+    dds_delete(domain_);
+    checked(participant_, what);
+  }
+}
+
+CycloneNode::~CycloneNode() {
+  dds_delete(domain_);
+}
+
+/// Cyclone keeps what participants say of themselves for whoever reads this topic.
+std::optional<unsigned> CycloneNode::process_of(const std::string& writer_guid) {
+  constexpr std::uint32_t kMost = 256;
+  const dds_entity_t reader =
+      dds_create_reader(participant_, DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr, nullptr);
+  std::array<void*, kMost> samples{};
+  std::array<dds_sample_info_t, kMost> infos{};
+  const dds_return_t count = dds_read(reader, samples.data(), infos.data(), kMost, kMost);
+  std::optional<unsigned> found;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(std::max(count, 0)) && !found; ++i) {
+    const auto& told = *static_cast<const dds_builtintopic_participant_t*>(samples[i]);
+    if (participant_of(guid_text(told.key)) == participant_of(writer_guid)) {
+      void* data = nullptr;
+      std::size_t size = 0;
+      if (infos[i].valid_data && dds_qget_userdata(told.qos, &data, &size)) {
+        found = noted_process({static_cast<const std::uint8_t*>(data), size});
+        dds_free(data);
+      }
+    }
+  }
+  if (count > 0) {
+    dds_return_loan(reader, samples.data(), count);
+  }
+  dds_delete(reader);
+  return found ? found : process_in_fastdds_guid(writer_guid);
+}
+
+void CycloneNode::tell(const Event& event) const {
+  if (sink_) {
+    sink_(event);
+  }
+}
+
+Topic CycloneNode::topic(const std::string& dds_type, const std::string& dds_topic) {
+  const std::lock_guard lock(topics_mutex_);
+  if (const auto known = topics_.find(dds_topic); known != topics_.end()) {
+    if (known->second.dds_type != dds_type) {
+      throw std::runtime_error("topic " + dds_topic + " is already used here with type " +
+                               known->second.dds_type + ", not " + dds_type);
+    }
+    return known->second.topic;
+  }
+  const Topic topic = create_topic(participant_, dds_topic, dds_type, pool_);
+  checked(topic.entity, "cannot create topic " + dds_topic + " of type " + dds_type);
+  topics_.emplace(dds_topic, KnownTopic{dds_type, topic});
+  return topic;
+}
+
+std::unique_ptr<backend::Writer> CycloneNode::make_writer(const backend::TypeOps& type,
+                                                          const std::string& dds_topic,
+                                                          const Qos& qos,
+                                                          PublisherEvents events) {
+  return std::make_unique<CycloneWriter>(
+      *this, type, topic(type.dds_name, dds_topic), qos, std::move(events));
+}
+
+std::unique_ptr<backend::Reader> CycloneNode::make_reader(const backend::TypeOps& type,
+                                                          const std::string& dds_topic,
+                                                          const Qos& qos,
+                                                          backend::Deliver deliver,
+                                                          SubscriptionEvents events) {
+  return std::make_unique<CycloneReader>(*this,
+                                         type,
+                                         topic(type.dds_name, dds_topic),
+                                         dds_topic,
+                                         qos,
+                                         std::move(deliver),
+                                         std::move(events));
+}
+
+}  // namespace cyclonedds
+
+namespace backend {
+
+std::unique_ptr<Node> make_node(const Config& config, const std::string& name, EventSink sink) {
+  return std::make_unique<cyclonedds::CycloneNode>(config, name, std::move(sink));
+}
+
+const char* name() {
+  return "cyclonedds";
+}
+
+}  // namespace backend
+}  // namespace trigpoint::bus

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "cyclone_writer.hpp"
+
+#include "endpoint.hpp"
+
+#include <utility>
+
+namespace trigpoint::bus::cyclonedds {
+
+namespace {
+
+QosPointer writer_qos(const Qos& qos) {
+  QosPointer result = make_qos(qos);
+  dds_qset_writer_data_lifecycle(result.get(),
+                                 false);  // a topic without key has nothing to dispose
+  if (qos.durability == Durability::kTransientLocal) {
+    // What late joiners get is not `history` in Cyclone.
+    dds_qset_durability_service(result.get(),
+                                0,
+                                DDS_HISTORY_KEEP_LAST,
+                                qos.depth,
+                                DDS_LENGTH_UNLIMITED,
+                                DDS_LENGTH_UNLIMITED,
+                                DDS_LENGTH_UNLIMITED);
+  }
+  return result;
+}
+
+}  // namespace
+
+CycloneWriter::CycloneWriter(CycloneNode& node,
+                             const backend::TypeOps& type,
+                             const Topic& topic,
+                             const Qos& qos,
+                             PublisherEvents events)
+    : node_(node),
+      type_(type),
+      topic_(topic),
+      qos_(qos),
+      events_(std::move(events)),
+      paced_(qos.bulk ? node.paced_sender() : nullptr) {
+  const ListenerPointer listener(dds_create_listener(this));
+  dds_lset_publication_matched(
+      listener.get(), [](dds_entity_t, dds_publication_matched_status_t status, void* self) {
+        static_cast<CycloneWriter*>(self)->tell_matched(static_cast<int>(status.current_count));
+      });
+  dds_lset_offered_incompatible_qos(
+      listener.get(), [](dds_entity_t, dds_offered_incompatible_qos_status_t status, void* self) {
+        static_cast<CycloneWriter*>(self)->tell_incompatible(status.last_policy_id);
+      });
+  const QosPointer policies = writer_qos(qos);
+  writer_ =
+      checked(dds_create_writer(node.participant(), topic.entity, policies.get(), listener.get()),
+              "cannot create a writer of " + type.dds_name);
+}
+
+CycloneWriter::~CycloneWriter() {
+  if (paced_ != nullptr) {
+    paced_->cancel(writer_);
+  }
+  dds_delete(writer_);  // when it returns no listener runs
+  node_.worker().cancel(this);
+}
+
+bool CycloneWriter::write(const void* value) {
+  const WireSample sample{&type_, value};
+  if (paced_ != nullptr) {
+    return paced_->send(writer_, topic_, sample, qos_.depth);
+  }
+  const OwnCall call;
+  return dds_write(writer_, &sample) == DDS_RETCODE_OK;
+}
+
+bool CycloneWriter::wait_for_acknowledgments(std::chrono::nanoseconds timeout) {
+  const auto deadline = std::chrono::steady_clock::now() + timeout;
+  if (paced_ != nullptr && !paced_->wait_until_sent(writer_, deadline)) {
+    return false;
+  }
+  const auto rest = std::chrono::nanoseconds(deadline - std::chrono::steady_clock::now()).count();
+  return dds_wait_for_acks(writer_, std::max<dds_duration_t>(rest, 0)) == DDS_RETCODE_OK;
+}
+
+int CycloneWriter::matched() const {
+  dds_publication_matched_status_t status{};
+  dds_get_publication_matched_status(writer_, &status);
+  return static_cast<int>(status.current_count);
+}
+
+std::string CycloneWriter::guid() const {
+  dds_guid_t guid{};
+  dds_get_guid(writer_, &guid);
+  return guid_text(guid);
+}
+
+// Cyclone may call from inside a call of ours, so users are told on the worker.
+
+void CycloneWriter::tell_matched(int readers) {
+  if (events_.readers_changed) {
+    node_.worker().post(this, [this, readers] { events_.readers_changed(readers); });
+  }
+}
+
+void CycloneWriter::tell_incompatible(std::uint32_t policy) {
+  if (events_.incompatible_qos) {
+    node_.worker().post(this, [this, policy] { events_.incompatible_qos(policy_name(policy)); });
+  }
+}
+
+}  // namespace trigpoint::bus::cyclonedds

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// The writing process of the vendor matrix, linked once with each vendor:
+//   matrix_writer DOMAIN TOPIC            its example, again and again until it is killed
+//   matrix_writer DOMAIN stream BYTES     IMU at 400 Hz beside clouds of so many bytes at 10 Hz
+#include "matrix_messages.hpp"
+#include <sys/prctl.h>
+
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <optional>
+#include <thread>
+
+namespace trigpoint::bus::matrix {
+namespace {
+
+using std::this_thread::sleep_for;
+using std::this_thread::sleep_until;
+using Clock = std::chrono::steady_clock;
+
+constexpr std::chrono::milliseconds kAgain{20};
+constexpr std::chrono::seconds kForever{60};
+
+/// The first samples after a match may be lost between vendors, so once is not enough.
+int repeat(Participant& participant, const std::string& wanted) {
+  bool found = false;
+  visit_topics([&]<class T>(const char* name, const Topic<T>& topic, const T& example) {
+    if (wanted == name) {
+      found = true;
+      Publisher<T> publisher(participant, topic);
+      while (publisher.publish(example)) {
+        sleep_for(kAgain);
+      }
+    }
+  });
+  std::fprintf(
+      stderr, "matrix_writer: %s %s\n", found ? "cannot publish" : "no topic", wanted.c_str());
+  return 1;
+}
+
+bool publish(Publisher<sensor_msgs::msg::PointCloud2>& clouds, PointCloudMessage cloud) {
+  auto message = to_message(cloud);
+  message.header().stamp(to_message(wall_clock_now_ns()));
+  return clouds.publish(message);
+}
+
+bool publish(Publisher<sensor_msgs::msg::Imu>& samples, ImuSample imu) {
+  imu.stamp_ns = wall_clock_now_ns();
+  return samples.publish(to_message(imu));
+}
+
+int stream(Participant& participant, std::size_t bytes) {
+  Publisher clouds(participant, topics::points);
+  Publisher samples(participant, topics::imu);
+  Publisher begin(participant, kBegin);
+  bool all_sent = true;
+  while (begin.matched() == 0) {
+    all_sent = publish(clouds, numbered_cloud(0, bytes)) && publish(samples, numbered_imu(0));
+    sleep_for(kCloudPeriod);
+  }
+  const auto start = Clock::now();
+  std::thread imu([&] {
+    for (std::uint32_t number = 1; number <= kImuSamples; ++number) {
+      sleep_until(start + number * kImuPeriod);
+      all_sent = publish(samples, numbered_imu(number)) && all_sent;
+    }
+  });
+  bool clouds_sent = true;
+  for (std::uint32_t number = 1; number <= kClouds; ++number) {
+    PointCloudMessage cloud = numbered_cloud(number, bytes);
+    sleep_until(start + number * kCloudPeriod);
+    clouds_sent = publish(clouds, std::move(cloud)) && clouds_sent;
+  }
+  imu.join();
+  const bool acknowledged =
+      clouds.wait_for_acknowledgments(kForever) && samples.wait_for_acknowledgments(kForever);
+  return all_sent && clouds_sent && acknowledged ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace trigpoint::bus::matrix
+
+int main(int count, char** arguments) {
+  using namespace trigpoint::bus;
+  prctl(PR_SET_PDEATHSIG, SIGKILL);  // never outlives a test that fails
+  if (count < 3) {
+    std::fprintf(stderr, "usage: matrix_writer DOMAIN TOPIC | matrix_writer DOMAIN stream BYTES\n");
+    return 2;
+  }
+  Participant participant(matrix::domain(std::atoi(arguments[1])), "matrix_writer");
+  const std::string what = arguments[2];
+  return what == "stream" && count > 3
+             ? matrix::stream(participant, std::strtoul(arguments[3], nullptr, 10))
+             : matrix::repeat(participant, what);
+}
