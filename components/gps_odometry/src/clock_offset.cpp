@@ -34,13 +34,13 @@ double moved_s(Nanoseconds from_ns, Nanoseconds to_ns) {
 
 ClockOffset::ClockOffset(const Config& config)
     : future_limit_ns_(from_seconds(config.future_limit_s)),
-      rewind_ns_(from_seconds(config.rewind_s)),
-      latest_ns_(from_seconds(std::max(config.clock_latest_s, config.rewind_s))),
+      same_ns_(from_seconds(config.clock_same_s)),
+      latest_ns_(from_seconds(std::max(config.clock_latest_s, config.clock_same_s))),
       latency_ns_(from_seconds(config.clock_latency_s)),
       latency_sigma_s_(config.clock_latency_sigma_s) {}
 
 bool ClockOffset::can_be_latency(Nanoseconds difference_ns) const {
-  return difference_ns <= future_limit_ns_ && difference_ns >= -rewind_ns_;
+  return difference_ns <= future_limit_ns_ && difference_ns >= -same_ns_;
 }
 
 bool ClockOffset::is_known(Nanoseconds difference_ns) const {
@@ -137,7 +137,12 @@ ClockVerdict ClockOffset::other(Nanoseconds stamp_ns, const Candidate& now) {
   const double off_s = moved_s(is_estimated_ ? soonest_ns_ : 0, now.difference_ns);
   ClockVerdict verdict;
   verdict.is_ahead = off_s > 0.0;
-  if (is_estimated_) {
+  const bool is_behind = !is_estimated_ && now.difference_ns < -same_ns_;
+  if (is_behind && now.difference_ns >= -latest_ns_) {
+    verdict.reason = "clock_jump";  // the rewind buffer may reach there
+    verdict.text = "Fix refused: its stamp is " + seconds(-now.difference_ns) +
+                   " behind the IMU's and went back; a late one would go on.";
+  } else if (is_estimated_) {
     verdict.reason = "clock_jump";
     verdict.text = "Fix refused: its clock is " + std::to_string(off_s) +
                    " s off what was estimated, expected at most " + seconds(kStep_ns) + ".";

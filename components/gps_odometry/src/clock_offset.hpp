@@ -55,7 +55,7 @@ class ClockOffset {
   ClockVerdict other(Nanoseconds stamp_ns, const Candidate& now);
 
   Nanoseconds future_limit_ns_;
-  Nanoseconds rewind_ns_;
+  Nanoseconds same_ns_;
   Nanoseconds latest_ns_;
   Nanoseconds latency_ns_;
   double latency_sigma_s_;

@@ -266,6 +266,27 @@ TEST_P(Clock, that_is_one_gives_the_same_bits_whatever_is_assumed_of_others) {
   }
 }
 
+/// Later than a clock may seem to be off, but their stamps go on.
+TEST_P(Clock, is_not_doubted_for_fixes_that_come_late_behind_newer_ones) {
+  const auto truth = drive(town(1.5, 3.0), 40.0);
+  Sensors sensors = rtk_robot();
+  sensors.latency_s = 0.63;
+  auto inputs = sense(truth, sensors, 5);
+  int fixes = 0;
+  for (Input& input : inputs) {
+    if (input.is_fix) {
+      input.available_s += ++fixes % 3 == 0 ? 0.45 : 0.0;
+    }
+  }
+  std::stable_sort(inputs.begin(), inputs.end(), [](const Input& a, const Input& b) {
+    return a.available_s < b.available_s;
+  });
+  GpsOdometry filter(config_with_datum(GetParam()), sensors.robot);
+  const Recorded result = run(filter, inputs, truth);
+  EXPECT_FALSE(has_event(result.events, "gnss_clock_moved"));
+  EXPECT_GT(filter.status().fixes_accepted + 10U, filter.status().fixes_received);
+}
+
 INSTANTIATE_TEST_SUITE_P(Filters, Clock, testing::Values("ekf15", "eskf18"));
 
 }  // namespace
