@@ -70,6 +70,7 @@ struct FusionGate::Impl {
   Witness witness_of(const AcceptedFix& fix, const PoseBuffer::Sample& at_fix) const;
   void judge_values(const AcceptedFix& fix, const PoseBuffer::Sample& at_fix, Output& out);
   void go_back(const MonitorOutcome& outcome, const Witness& witness, Output& out);
+  void settle(const Eigen::Vector3d& slid_map_m, const Witness& witness, Output& out);
   void replace(const Witness& witness, const Alignment& alignment, Output& out);
   bool is_replacement_awaited(Output& out);
   AxisChoices choose_smoothly(const Eigen::Vector3d& reported_m2) const;

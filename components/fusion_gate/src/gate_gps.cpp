@@ -3,6 +3,7 @@
 #include "trigpoint/base/rejections.hpp"
 
 #include "gate.hpp"
+#include "sentence.hpp"
 
 #include <algorithm>
 #include <map>
@@ -241,7 +242,11 @@ bool FusionGate::Impl::tell_of(ToldFix told, Output& out) {
     return false;
   }
   std::optional<Refusal> late;
-  if (!told.refusal()) {
+  if (FixQueue::is_far_ahead(stamp_ns, now_ns)) {
+    late = told.refusal().value_or(
+        Refusal{"from_the_future",
+                sentence("its stamp is %.1f s ahead of data time", to_seconds(stamp_ns - now_ns))});
+  } else if (!told.refusal()) {
     late = check_age(told.fix, last_lio_ns, config.max_fix_age_s);
     if (!late && mode == Mode::kSmooth && queue.is_overtaken(stamp_ns)) {
       late = Refusal{"behind_newer_fix", "a newer fix was judged already"};
