@@ -59,6 +59,7 @@ struct FusionGate::Impl {
   // --- alignment and rows
   void judge_waiting(Output& out);
   bool is_mapper_awaited(Output& out);
+  void note_refused(const ToldFix& told, const PoseBuffer::Answer& lio_pose);
   void judge(const AcceptedFix& fix, const PoseBuffer::Answer& lio_pose, Output& out);
   void add_pair(const AcceptedFix& fix, const PoseBuffer::Sample& at_fix, Output& out);
   void make_rows(const AcceptedFix& fix, Output& out);

@@ -34,10 +34,6 @@ std::uint64_t growth(std::uint64_t now, std::uint64_t before) {
   return now > before ? now - before : 0;
 }
 
-std::string refused_code(const std::string& reason) {
-  return "refused_by_filter_" + reason;
-}
-
 std::string refused_sentence(const GpsStatus& gps, const std::string& reason) {
   return "refused by " + gps.source + ": " + reason;
 }

@@ -42,6 +42,7 @@ struct LyingDriveSettings {
   YawPose T_map_odom{2.0, {30.0, -10.0, 5.0}};
   double fix_latency_s{0.13};
   std::function<double(std::size_t)> delay_s;  ///< besides, by the number of the fix; may be empty
+  std::function<bool(double)> is_refused;      ///< by the filter's gate; may be empty: never
   bool with_records{true};                     ///< the filter tells of all recent fixes
 };
 
@@ -225,8 +226,12 @@ class LyingDrive {
     raw.altitude_m = place.height_m;
     raw.covariance_type = CovarianceType::kDiagonalKnown;
     raw.covariance_enu_m2 = claimed_m().cwiseAbs2().asDiagonal();
-    const FixRecord record{
-        raw.stamp_ns, true, "", antenna_m, (2.0 * claimed_m()).cwiseAbs2().asDiagonal()};
+    const bool refused = s_.is_refused && s_.is_refused(now_s_);
+    const FixRecord record{raw.stamp_ns,
+                           !refused,
+                           refused ? "gate" : "",
+                           antenna_m,
+                           (2.0 * claimed_m()).cwiseAbs2().asDiagonal()};
     const double delay_s = s_.delay_s ? s_.delay_s(fixes_.size()) : 0.0;
     fixes_.push_back(std::llround(now_s_ / kTick_s));
     waiting_.emplace(now_s_ + s_.fix_latency_s + delay_s, Waiting{raw, record});

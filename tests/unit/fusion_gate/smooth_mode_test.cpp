@@ -245,6 +245,20 @@ TEST_P(SmoothMode, aligns_anew_when_a_silence_follows_soon_on_the_end_of_a_wrong
   }
 }
 
+/// As eskf18 does: the first fixes after a jump are refused by the filter, the next ones absorbed.
+TEST_P(SmoothMode, counts_what_the_filter_refused_when_it_aligns_anew) {
+  settings.speed_mps = 2.3;
+  settings.lie_enu_m = [this](double at_s) {
+    return Eigen::Vector3d((at_s < 29.95 ? 5.0 : 0.0) * aside);
+  };
+  settings.is_refused = [](double at_s) { return at_s > 29.95 && at_s < 30.75; };
+  settings.has_fix = [](double at_s) { return at_s < 34.5; };
+  settings.duration_s = 40.0;
+  LyingDrive drive(settings);
+  drive.run();
+  EXPECT_TRUE(drive.has_event("realigned"));
+}
+
 /// What LIO cannot have drifted and says that it did not slide.
 TEST_P(SmoothMode, gives_in_to_fixes_that_agree_for_five_minutes_however_long_it_was_right) {
   settings.duration_s = 600.0;

@@ -21,6 +21,7 @@ constexpr double kScatterWindow_s = 30.0;
 constexpr std::size_t kScatterFixes = 10;
 constexpr double kNewSolution_s = 5.0;  // after such a silence the receiver began anew
 constexpr double kJump_s = 1.0;
+constexpr std::size_t kRefusedKept = 32;
 constexpr double kUnbrokenGap_s = 2.0;  // a longer silence confirms nothing
 // An alignment that was confirmed is given up only for fixes that agree against it for much longer.
 constexpr double kLongContradiction_s = 120.0;
@@ -281,6 +282,10 @@ MonitorOutcome FixMonitor::judge(const Witness& witness, const LioStatus& lio) {
       forget_since(outcome.taken_in_since_ns[k].value_or(sighting.stamp_ns), part);
     }
   }
+  if (outcome.change[0] == Trust::Change::kDoubted) {
+    begin_with_refused(sighting, lio);
+  }
+  refused_.clear();
   // A reflection that spoils east and north spoils the height; a wrong height alone spoils nothing.
   outcome.trusted[0] = trusts_[0].trusted();
   outcome.trusted[1] = trusts_[1].trusted() && outcome.trusted[0];
@@ -300,6 +305,25 @@ MonitorOutcome FixMonitor::judge(const Witness& witness, const LioStatus& lio) {
     outcome.realignment = rival_of(sighting, trusts_[0].trusted() ? Part::kHeight : Part::kLevel);
   }
   return outcome;
+}
+
+void FixMonitor::on_refused(const Witness& witness) {
+  refused_.push_back(sighting_of(witness));
+  if (refused_.size() > kRefusedKept) {
+    refused_.pop_front();
+  }
+}
+
+/// A jump that the GPS filter found first is as old as the first fix that it refused for it.
+void FixMonitor::begin_with_refused(const Sighting& sighting, const LioStatus& lio) {
+  const auto first = std::find_if(refused_.begin(), refused_.end(), [&](const Sighting& s) {
+    return to_seconds(sighting.stamp_ns - s.stamp_ns) <= kJump_s &&
+           sigmas_of(compare_displacement(s, sighting, lio, config_), Part::kLevel) <=
+               config_.smooth.enter_sigmas;
+  });
+  if (first != refused_.end()) {
+    trusts_[index_of(Part::kLevel)].begin_earlier(*first);
+  }
 }
 
 void FixMonitor::on_alignment(const Witness& witness) {
@@ -362,6 +386,7 @@ void FixMonitor::begin_anew() {
   last_row_ = {};
   unsettled_m2_.setZero();
   settling_.end();
+  refused_.clear();
   confirmed_s_ = 0.0;
 }
 

@@ -49,6 +49,10 @@ class FixMonitor {
   /// The mapper is aligned.
   MonitorOutcome judge(const Witness& witness, const LioStatus& lio);
 
+  /// The GPS filter refused the fix for what it says. It is no evidence for the pose, but what the
+  /// receiver said counts when the next one says it again. `witness.raw` is known.
+  void on_refused(const Witness& witness);
+
   /// The fixes that the alignment rests on are trusted ones.
   void on_alignment(const Witness& witness);
 
@@ -88,6 +92,7 @@ class FixMonitor {
                     const Sighting& sighting,
                     const LioStatus& lio,
                     MonitorOutcome& outcome);
+  void begin_with_refused(const Sighting& sighting, const LioStatus& lio);
   bool is_new_solution(const Sighting& sighting, const LioStatus& lio) const;
   Difference level_difference(const AcceptedFix& fix,
                               const Sighting& sighting,
@@ -117,7 +122,8 @@ class FixMonitor {
   // By how much trusted fixes are still off T_map_odom: believed, and not yet taken in.
   Eigen::Vector3d unsettled_m2_{Eigen::Vector3d::Zero()};
   Settling settling_;
-  double confirmed_s_{0.0};  // time for which fixes confirmed the alignment
+  std::deque<Sighting> refused_;  // by the filter, since a fix was judged
+  double confirmed_s_{0.0};       // time for which fixes confirmed the alignment
 };
 
 }  // namespace trigpoint::fusion_gate
