@@ -113,6 +113,10 @@ class Cores {
     for (const Odometry& odometry : step.fused) {
       take(odometry);
     }
+    for (const Odometry& raw : step.fused_raw) {
+      run_.raw_pairs.push_back(
+          {raw.stamp_ns, raw.T_frame_child, truth_->at(raw.stamp_ns).T_map_base});
+    }
     for (const StateUpdate& update : step.state_updates) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
         if (update.decision[axis] == AxisDecision::kFused) {

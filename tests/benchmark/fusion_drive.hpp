@@ -40,10 +40,11 @@ struct GpsSigma {
 
 /// What one mode made of the drive.
 struct Run {
-  evaluation::Trajectory fused;             ///< as published online, at IMU rate
-  evaluation::Trajectory odom;              ///< lio/odometry_imu_rate
-  std::vector<evaluation::PosePair> pairs;  ///< fused and truth
-  double nees_pose{kNaN};                   ///< mean over fused, per degree of freedom
+  evaluation::Trajectory fused;                 ///< as published online, at IMU rate
+  evaluation::Trajectory odom;                  ///< lio/odometry_imu_rate
+  std::vector<evaluation::PosePair> pairs;      ///< fused and truth
+  std::vector<evaluation::PosePair> raw_pairs;  ///< fusion/odometry_raw and truth
+  double nees_pose{kNaN};                       ///< mean over fused, per degree of freedom
   double nees_position{kNaN};
   /// Root mean squares over fused of error and sigma: x y z, roll pitch yaw about the axes of map.
   Eigen::Matrix<double, 6, 1> rms_error{Eigen::Matrix<double, 6, 1>::Constant(kNaN)};

@@ -28,6 +28,17 @@ void describe_log(recording::LogOptions& log, ConfigFields& fields) {
                 "KITTI: its beams' elevation angles are too low by this much");
 }
 
+/// What the gate may send, the mapper must take.
+void refuse_rows_that_come_too_late(const pipeline::CoreConfigs& cores) {
+  const double latest_s = cores.fusion_gate.max_fix_age_s + fusion_gate::kJudgingSlack_s;
+  const double kept_s = cores.lio_mapper.rows.history_s;
+  if (latest_s > kept_s) {
+    throw ConfigError("fusion_gate.max_fix_age_s allows rows that are " + std::to_string(latest_s) +
+                      " s old, and lio_mapper.rows.history_s keeps only " + std::to_string(kept_s) +
+                      " s: make the former smaller or the latter larger");
+  }
+}
+
 }  // namespace
 
 void describe(SystemConfig& config, ConfigFields& fields) {
@@ -57,6 +68,7 @@ std::string mode_of(const SystemConfig& config) {
 
 void load(SystemConfig& config, const std::vector<std::string>& files) {
   load_config(files, [&config](ConfigFields& fields) { describe(config, fields); });
+  refuse_rows_that_come_too_late(config.cores);
 }
 
 std::string print(SystemConfig config) {

@@ -59,6 +59,7 @@ struct FusionGate::Impl {
   // --- alignment and rows
   void judge_waiting(Output& out);
   bool is_mapper_awaited(Output& out);
+  void note_refused(const ToldFix& told, const PoseBuffer::Answer& lio_pose);
   void judge(const AcceptedFix& fix, const PoseBuffer::Answer& lio_pose, Output& out);
   void add_pair(const AcceptedFix& fix, const PoseBuffer::Sample& at_fix, Output& out);
   void make_rows(const AcceptedFix& fix, Output& out);
@@ -70,6 +71,7 @@ struct FusionGate::Impl {
   Witness witness_of(const AcceptedFix& fix, const PoseBuffer::Sample& at_fix) const;
   void judge_values(const AcceptedFix& fix, const PoseBuffer::Sample& at_fix, Output& out);
   void go_back(const MonitorOutcome& outcome, const Witness& witness, Output& out);
+  void settle(const Eigen::Vector3d& slid_map_m, const Witness& witness, Output& out);
   void replace(const Witness& witness, const Alignment& alignment, Output& out);
   bool is_replacement_awaited(Output& out);
   AxisChoices choose_smoothly(const Eigen::Vector3d& reported_m2) const;

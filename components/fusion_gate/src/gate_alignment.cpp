@@ -13,11 +13,6 @@ namespace {
 constexpr double kDegrees = 180.0 / std::numbers::pi;
 constexpr double kAlignmentWait_s = 0.5;  // a mapper has it with its next scan
 
-/// A fix may wait for order as long as it may be late, and for LIO's next scan to cover it. One
-/// that waited longer, for the mapper or for its poses, is older than the mapper's rows.history_s
-/// allows.
-constexpr double kJudgingSlack_s = 0.15;
-
 }  // namespace
 
 void FusionGate::Impl::judge_waiting(Output& out) {
@@ -34,11 +29,26 @@ void FusionGate::Impl::judge_waiting(Output& out) {
     const ToldFix told = queue.take();
     verdict_changed = true;
     if (refusal) {
+      note_refused(told, lio_pose);
       verdicts.record(told.fix.stamp_ns, false, refusal->code, refusal->reason);
       tell(out, Severity::kWarning, "fix_refused", refusal->reason);
     } else {
       judge(told.fix, lio_pose, out);
     }
+  }
+}
+
+/// What the filter's gate refuses is still the receiver's word.
+void FusionGate::Impl::note_refused(const ToldFix& told, const PoseBuffer::Answer& lio_pose) {
+  const bool by_gate =
+      told.refused_by_filter && told.refused_by_filter->code == refused_code(kFilterGate);
+  if (!by_gate || mode != Mode::kSmooth || !aligned() ||
+      lio_pose.coverage != PoseBuffer::Coverage::kCovered) {
+    return;
+  }
+  const Witness witness = witness_of(told.fix, lio_pose.sample);
+  if (witness.raw) {
+    monitor.on_refused(witness);
   }
 }
 

@@ -3,6 +3,7 @@
 #include "trigpoint/base/rejections.hpp"
 
 #include "gate.hpp"
+#include "sentence.hpp"
 
 #include <algorithm>
 #include <map>
@@ -31,10 +32,6 @@ std::map<std::string, std::uint64_t> new_refusals(const GpsStatus& now, const Gp
 
 std::uint64_t growth(std::uint64_t now, std::uint64_t before) {
   return now > before ? now - before : 0;
-}
-
-std::string refused_code(const std::string& reason) {
-  return "refused_by_filter_" + reason;
 }
 
 std::string refused_sentence(const GpsStatus& gps, const std::string& reason) {
@@ -241,7 +238,11 @@ bool FusionGate::Impl::tell_of(ToldFix told, Output& out) {
     return false;
   }
   std::optional<Refusal> late;
-  if (!told.refusal()) {
+  if (FixQueue::is_far_ahead(stamp_ns, now_ns)) {
+    late = told.refusal().value_or(
+        Refusal{"from_the_future",
+                sentence("its stamp is %.1f s ahead of data time", to_seconds(stamp_ns - now_ns))});
+  } else if (!told.refusal()) {
     late = check_age(told.fix, last_lio_ns, config.max_fix_age_s);
     if (!late && mode == Mode::kSmooth && queue.is_overtaken(stamp_ns)) {
       late = Refusal{"behind_newer_fix", "a newer fix was judged already"};

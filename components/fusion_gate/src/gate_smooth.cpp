@@ -84,6 +84,10 @@ void FusionGate::Impl::judge_values(const AcceptedFix& fix,
          "the alignment rested on wrong fixes: odom is aligned with map anew");
     return;
   }
+  if (outcome.slid_map_m) {
+    settle(*outcome.slid_map_m, witness, out);
+    return;
+  }
   go_back(outcome, witness, out);
   const AxisChoices choices = choose_smoothly(variance_of(fix));
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -94,6 +98,9 @@ void FusionGate::Impl::judge_values(const AcceptedFix& fix,
     weighted.covariance_map_m2 =
         as_measured(fix.covariance_map_m2, monitor.scatter_map_m2(*lio), least_share_of(witness));
     send_rows(weighted, choices, out);
+    monitor.on_rows({choices[0].decision == AxisDecision::kFused,
+                     choices[1].decision == AxisDecision::kFused,
+                     choices[2].decision == AxisDecision::kFused});
     return;
   }
   const Refusal& why = monitor.trust(Part::kLevel).reason();
@@ -124,6 +131,28 @@ void FusionGate::Impl::go_back(const MonitorOutcome& outcome, const Witness& wit
        sentence("GPS crept away: T_map_odom goes back to where it was %.1f s ago, by %.2f m",
                 to_seconds(witness.fix.stamp_ns - *wanted),
                 change_m));
+}
+
+/// East and north go where the fixes since a silence say; yaw and height are left alone. Where
+/// T_map_odom was before the slide is nowhere to go back to.
+void FusionGate::Impl::settle(const Eigen::Vector3d& slid_map_m,
+                              const Witness& witness,
+                              Output& out) {
+  const AcceptedFix& fix = witness.raw ? *witness.raw : witness.fix;
+  const Eigen::Matrix3d covariance_m2 = floored(fix.covariance_map_m2, config.min_sigma_m);
+  const double off_m = slid_map_m.head<2>().norm();
+  replace(witness,
+          moved_aside(*lio,
+                      witness.lio_pose.T_frame_child.p,
+                      slid_map_m.head<2>(),
+                      covariance_m2.topLeftCorner<2, 2>()),
+          out);
+  monitor.on_settled();
+  placements.clear();
+  const std::string text =
+      sentence("LIO slid by %.2f m without GPS: east and north are placed anew", off_m);
+  verdicts.record(witness.fix.stamp_ns, true, "alignment", text);
+  tell(out, Severity::kWarning, "placed_anew", text);
 }
 
 void FusionGate::Impl::replace(const Witness& witness, const Alignment& alignment, Output& out) {

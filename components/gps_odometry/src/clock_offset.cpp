@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <vector>
 
 namespace trigpoint::gps_odometry {
 
@@ -19,6 +21,10 @@ constexpr std::size_t kAgreeing = 3;
 constexpr Nanoseconds kAgreeing_ns = kNanosecondsPerSecond;
 constexpr Nanoseconds kLongestAgreement_ns = 10 * kNanosecondsPerSecond;
 constexpr std::size_t kHeard = 32;
+constexpr std::size_t kLeastStamps = 8;  // fewer do not tell the receiver's interval
+// Of the usual interval, between a fix that comes late and those before and after it.
+constexpr double kLeastGap = 0.8;
+constexpr double kMostGap = 3.2;  // those may be late, too
 
 std::string seconds(Nanoseconds duration_ns) {
   return std::to_string(to_seconds(duration_ns)) + " s";
@@ -34,13 +40,13 @@ double moved_s(Nanoseconds from_ns, Nanoseconds to_ns) {
 
 ClockOffset::ClockOffset(const Config& config)
     : future_limit_ns_(from_seconds(config.future_limit_s)),
-      rewind_ns_(from_seconds(config.rewind_s)),
-      latest_ns_(from_seconds(std::max(config.clock_latest_s, config.rewind_s))),
+      same_ns_(from_seconds(config.clock_same_s)),
+      latest_ns_(from_seconds(std::max(config.clock_latest_s, config.clock_same_s))),
       latency_ns_(from_seconds(config.clock_latency_s)),
       latency_sigma_s_(config.clock_latency_sigma_s) {}
 
 bool ClockOffset::can_be_latency(Nanoseconds difference_ns) const {
-  return difference_ns <= future_limit_ns_ && difference_ns >= -rewind_ns_;
+  return difference_ns <= future_limit_ns_ && difference_ns >= -same_ns_;
 }
 
 bool ClockOffset::is_known(Nanoseconds difference_ns) const {
@@ -55,7 +61,37 @@ bool ClockOffset::is_other_clock(Nanoseconds stamp_ns, Nanoseconds difference_ns
       !candidates_.empty()) {
     return true;
   }
-  return newest_stamp_ns_ && stamp_ns < *newest_stamp_ns_ - kStep_ns;
+  return newest_stamp_ns_ && stamp_ns < *newest_stamp_ns_ - kStep_ns && !fills_gap(stamp_ns);
+}
+
+/// A fix that was overtaken is missing among those that came. The stamps of a clock that went back
+/// were there already, or lie anywhere between them.
+bool ClockOffset::fills_gap(Nanoseconds stamp_ns) const {
+  if (stamps_.size() < kLeastStamps) {
+    return false;
+  }
+  std::vector<Nanoseconds> intervals_ns;
+  for (auto it = std::next(stamps_.begin()); it != stamps_.end(); ++it) {
+    intervals_ns.push_back(*it - *std::prev(it));
+  }
+  const auto middle = intervals_ns.begin() + static_cast<std::ptrdiff_t>(intervals_ns.size() / 2);
+  std::nth_element(intervals_ns.begin(), middle, intervals_ns.end());
+  const auto next = stamps_.lower_bound(stamp_ns);
+  if (next == stamps_.begin() || next == stamps_.end()) {
+    return false;
+  }
+  const auto is_neighbour = [&](Nanoseconds distance_ns) {
+    const double share = to_seconds(distance_ns) / to_seconds(*middle);
+    return share >= kLeastGap && share <= kMostGap;
+  };
+  return is_neighbour(*next - stamp_ns) && is_neighbour(stamp_ns - *std::prev(next));
+}
+
+void ClockOffset::remember(Nanoseconds stamp_ns) {
+  stamps_.insert(stamp_ns);
+  if (stamps_.size() > kHeard) {
+    stamps_.erase(stamps_.begin());
+  }
 }
 
 bool ClockOffset::heard_before(Nanoseconds stamp_ns) {
@@ -100,6 +136,7 @@ ClockVerdict ClockOffset::known(Nanoseconds stamp_ns, const Candidate& now) {
   candidates_.clear();
   newest_stamp_ns_ = std::max(newest_stamp_ns_.value_or(stamp_ns), stamp_ns);
   if (!is_estimated_) {
+    remember(stamp_ns);
     return {stamp_ns, "", "", std::nullopt, false};
   }
   if (heard_before(stamp_ns)) {
@@ -123,6 +160,7 @@ ClockVerdict ClockOffset::other(Nanoseconds stamp_ns, const Candidate& now) {
     soonest_imu_ns_ = now.imu_ns;
     newest_stamp_ns_.reset();
     heard_.clear();
+    stamps_.clear();
     ClockVerdict verdict = known(stamp_ns, now);
     verdict.event = Event{
         Severity::kWarning,
@@ -137,7 +175,12 @@ ClockVerdict ClockOffset::other(Nanoseconds stamp_ns, const Candidate& now) {
   const double off_s = moved_s(is_estimated_ ? soonest_ns_ : 0, now.difference_ns);
   ClockVerdict verdict;
   verdict.is_ahead = off_s > 0.0;
-  if (is_estimated_) {
+  const bool is_behind = !is_estimated_ && now.difference_ns < -same_ns_;
+  if (is_behind && now.difference_ns >= -latest_ns_) {
+    verdict.reason = "clock_jump";  // the rewind buffer may reach there
+    verdict.text = "Fix refused: its stamp is " + seconds(-now.difference_ns) +
+                   " behind the IMU's and went back; a late one would go on.";
+  } else if (is_estimated_) {
     verdict.reason = "clock_jump";
     verdict.text = "Fix refused: its clock is " + std::to_string(off_s) +
                    " s off what was estimated, expected at most " + seconds(kStep_ns) + ".";
@@ -163,6 +206,7 @@ ClockVerdict ClockOffset::place(Nanoseconds fix_stamp_ns, Nanoseconds imu_ns) {
   if (is_other_clock(fix_stamp_ns, now.difference_ns)) {
     return other(fix_stamp_ns, now);
   }
+  remember(fix_stamp_ns);
   return {fix_stamp_ns, "", "", std::nullopt, false};  // late
 }
 

@@ -10,6 +10,7 @@
 
 #include <deque>
 #include <optional>
+#include <set>
 #include <string>
 
 namespace trigpoint::gps_odometry {
@@ -48,6 +49,8 @@ class ClockOffset {
   bool can_be_latency(Nanoseconds difference_ns) const;
   bool is_known(Nanoseconds difference_ns) const;
   bool is_other_clock(Nanoseconds stamp_ns, Nanoseconds difference_ns) const;
+  bool fills_gap(Nanoseconds stamp_ns) const;
+  void remember(Nanoseconds stamp_ns);
   bool heard_before(Nanoseconds stamp_ns);
   void keep(const Candidate& candidate);
   std::optional<Nanoseconds> agreed() const;
@@ -55,7 +58,7 @@ class ClockOffset {
   ClockVerdict other(Nanoseconds stamp_ns, const Candidate& now);
 
   Nanoseconds future_limit_ns_;
-  Nanoseconds rewind_ns_;
+  Nanoseconds same_ns_;
   Nanoseconds latest_ns_;
   Nanoseconds latency_ns_;
   double latency_sigma_s_;
@@ -65,6 +68,7 @@ class ClockOffset {
   Nanoseconds soonest_imu_ns_{0};
   std::optional<Nanoseconds> newest_stamp_ns_;  ///< of fixes on the known clock
   std::deque<Candidate> candidates_;            ///< fixes in a row that are on another clock
+  std::set<Nanoseconds> stamps_;                ///< the newest, of fixes on the IMU's clock
   std::deque<Nanoseconds> heard_;               ///< stamps as they came
 };
 

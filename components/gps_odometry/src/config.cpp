@@ -60,6 +60,12 @@ void describe_map(Config& c, ConfigFields& f) {
 }
 
 void describe_clock(Config& c, ConfigFields& f) {
+  f.number(
+      "clock_same_s",
+      c.clock_same_s,
+      "A fix that seems to be this late at most has the IMU's clock; beyond, its stamps may have "
+      "gone back (s)",
+      kPositive);
   f.number("clock_latest_s",
            c.clock_latest_s,
            "No fix is later than this: one that seems to be has another clock than the IMU (s)",

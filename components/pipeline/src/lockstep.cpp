@@ -92,6 +92,7 @@ struct Lockstep::Impl {
   void take(fusion_gate::Output&& output, Step& step) {
     append(step.events, std::move(output.events));
     append(step.fused, std::move(output.fused));
+    append(step.fused_raw, std::move(output.fused_raw));
     append(step.fusion_status, std::move(output.status));
     for (const StateUpdate& update : output.state_updates) {
       take(mapper.on_state_update(update), step);

@@ -240,6 +240,27 @@ TEST(FusionGate, makes_no_row_that_the_mapper_would_find_too_old) {
   EXPECT_EQ(count_of(drive.record().statuses.back(), "late"), 3U);  // of 20.0, 20.2 and 20.4 s
 }
 
+TEST(FusionGate, lets_no_fix_from_the_far_future_wait_in_the_place_of_true_ones) {
+  SimulatedDrive drive{Scenario{}};
+  drive.run_until(20.0);
+  const std::size_t before = drive.record().updates.size();
+  GpsStatus status = drive.status(20.0);
+  constexpr int kFromTheFuture = 80;  // more than may wait
+  for (int k = 0; k < kFromTheFuture; ++k) {
+    status.recent_fixes.push_back({drive.stamp(1e6 + k),
+                                   true,
+                                   "",
+                                   status.accepted_antenna_map_m,
+                                   status.accepted_covariance_map_m2});
+  }
+  drive.keep(drive.gate().on_gps_status(status, "gps-a"));
+  drive.run_until(24.0);
+  const FusionStatus& last = drive.record().statuses.back();
+  EXPECT_EQ(count_of(last, "from_the_future"), static_cast<std::uint64_t>(kFromTheFuture));
+  EXPECT_EQ(count_of(last, "no_lio_pose"), 0U);
+  EXPECT_GE(drive.record().updates.size(), before + 18);
+}
+
 TEST(FusionGate, judges_a_repeated_status_once) {
   SimulatedDrive drive{Scenario{}};
   drive.run_until(20.0);

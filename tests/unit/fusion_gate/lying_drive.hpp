@@ -37,9 +37,12 @@ struct LyingDriveSettings {
   double lio_scale{0.0005};                             ///< LIO's way is longer by this share
   Eigen::Vector3d lio_jump_m{Eigen::Vector3d::Zero()};  ///< of odom against map during an outage
   double lio_jump_at_s{1e9};
+  double mapper_walk_m_per_sqrt_m{0.02};  ///< drift that the mapper admits
+  bool mapper_knows_blindness{true};      ///< the real one does not
   YawPose T_map_odom{2.0, {30.0, -10.0, 5.0}};
   double fix_latency_s{0.13};
   std::function<double(std::size_t)> delay_s;  ///< besides, by the number of the fix; may be empty
+  std::function<bool(double)> is_refused;      ///< by the filter's gate; may be empty: never
   bool with_records{true};                     ///< the filter tells of all recent fixes
 };
 
@@ -111,10 +114,11 @@ class LyingDrive {
   }
 
   /// Of fusion/odometry against the truth, which odom follows within millimetres in 100 ms.
-  double largest_step_m() const {
+  double largest_step_m(double from_s = 0.0) const {
     double result = 0.0;
     for (std::size_t k = 10; k < samples.size(); ++k) {
-      result = std::max(result, (samples[k].error_m - samples[k - 10].error_m).norm());
+      const double step_m = (samples[k].error_m - samples[k - 10].error_m).norm();
+      result = samples[k - 10].at_s < from_s ? result : std::max(result, step_m);
     }
     return result;
   }
@@ -222,8 +226,12 @@ class LyingDrive {
     raw.altitude_m = place.height_m;
     raw.covariance_type = CovarianceType::kDiagonalKnown;
     raw.covariance_enu_m2 = claimed_m().cwiseAbs2().asDiagonal();
-    const FixRecord record{
-        raw.stamp_ns, true, "", antenna_m, (2.0 * claimed_m()).cwiseAbs2().asDiagonal()};
+    const bool refused = s_.is_refused && s_.is_refused(now_s_);
+    const FixRecord record{raw.stamp_ns,
+                           !refused,
+                           refused ? "gate" : "",
+                           antenna_m,
+                           (2.0 * claimed_m()).cwiseAbs2().asDiagonal()};
     const double delay_s = s_.delay_s ? s_.delay_s(fixes_.size()) : 0.0;
     fixes_.push_back(std::llround(now_s_ / kTick_s));
     waiting_.emplace(now_s_ + s_.fix_latency_s + delay_s, Waiting{raw, record});
@@ -293,8 +301,9 @@ class LyingDrive {
     Eigen::Vector4d turn = Eigen::Vector4d::UnitX();
     turn.tail<3>() = -Eigen::Vector3d::UnitZ().cross(T_.pose().q * p_odom_m_);
     P_ += 0.00035 * 0.00035 * moved_m * turn * turn.transpose();
-    P_.bottomRightCorner<3, 3>().diagonal().array() += 0.02 * 0.02 * moved_m;
-    if (blind) {  // which the real mapper does not do yet
+    P_.bottomRightCorner<3, 3>().diagonal().array() +=
+        s_.mapper_walk_m_per_sqrt_m * s_.mapper_walk_m_per_sqrt_m * moved_m;
+    if (blind && s_.mapper_knows_blindness) {
       const Eigen::Vector3d along_m = T_.pose().q * Eigen::Vector3d::UnitX();
       P_.bottomRightCorner<3, 3>() += 0.6 * moved_m * along_m * along_m.transpose();
     }

@@ -193,6 +193,84 @@ TEST_P(SmoothMode, does_not_lock_itself_out_after_a_drift_of_one_percent) {
   EXPECT_LT(drive.worst(0, 1, 130.0), 0.1);
 }
 
+/// A mapper that is sure of itself, as the real one is, gives rows no weight.
+TEST_P(SmoothMode, is_placed_anew_after_lio_slid_without_gps_where_it_was_blind) {
+  settings.mapper_walk_m_per_sqrt_m = 0.005;
+  settings.mapper_knows_blindness = false;
+  settings.is_blind = [](double at_s) { return at_s >= 60.0 && at_s < 80.0; };
+  settings.lio_jump_at_s = 70.0;
+  settings.lio_jump_m = {3.0, 0.0, 0.0};  // along the blind axis
+  settings.has_fix = [](double at_s) { return at_s < 55.0 || at_s >= 85.0; };
+  LyingDrive drive(settings);
+  drive.run();
+  const auto raw_error_m = [&](double from_s) {
+    double worst_m = 0.0;
+    for (const DriveSample& sample : drive.samples) {
+      worst_m =
+          sample.at_s < from_s ? worst_m : std::max(worst_m, sample.raw_error_m.head<2>().norm());
+    }
+    return worst_m;
+  };
+  ASSERT_GT(drive.worst(0, 1, 80.0, 85.0), 1.0) << "LIO did slide";
+  EXPECT_TRUE(drive.has_event("placed_anew"));
+  EXPECT_LT(raw_error_m(85.0 + 2.0), 0.15);
+  EXPECT_LT(drive.worst(0, 1, 102.0), 0.15);
+  EXPECT_GT(drive.share_used(0, 90.0, 149.0), 0.95);
+  EXPECT_LT(drive.largest_step_m(80.0), kLargestStep_m);
+}
+
+TEST_P(SmoothMode, does_not_take_a_wrong_fix_for_a_slide_when_gps_comes_back_with_it) {
+  settings.has_fix = [](double at_s) { return at_s < 60.0 || at_s >= 75.0; };
+  settings.lie_enu_m = [this](double at_s) {
+    return Eigen::Vector3d((at_s >= 70.0 && at_s < 100.0 ? 3.0 : 0.0) * aside);
+  };
+  LyingDrive drive(settings);
+  drive.run();
+  EXPECT_FALSE(drive.has_event("placed_anew"));
+  EXPECT_LT(drive.worst(0, 2), 0.3);
+}
+
+TEST_P(SmoothMode, aligns_anew_when_a_silence_follows_soon_on_the_end_of_a_wrong_fix) {
+  settings.lie_enu_m = [this](double at_s) {
+    return Eigen::Vector3d((at_s < 30.0 ? 5.0 : 0.0) * aside);
+  };
+  settings.has_fix = [](double at_s) { return at_s < 32.0 || at_s >= 45.0; };
+  LyingDrive drive(settings);
+  drive.run();
+  EXPECT_TRUE(drive.has_event("realigned"));
+  for (const DriveSample& sample : drive.samples) {
+    if (sample.at_s > 45.0 + 20.0 / settings.speed_mps) {
+      ASSERT_LT(sample.raw_error_m.norm(), 0.25) << sample.at_s;
+    }
+  }
+}
+
+/// As eskf18 does: the first fixes after a jump are refused by the filter, the next ones absorbed.
+TEST_P(SmoothMode, counts_what_the_filter_refused_when_it_aligns_anew) {
+  settings.speed_mps = 2.3;
+  settings.lie_enu_m = [this](double at_s) {
+    return Eigen::Vector3d((at_s < 29.95 ? 5.0 : 0.0) * aside);
+  };
+  settings.is_refused = [](double at_s) { return at_s > 29.95 && at_s < 30.75; };
+  settings.has_fix = [](double at_s) { return at_s < 34.5; };
+  settings.duration_s = 40.0;
+  LyingDrive drive(settings);
+  drive.run();
+  EXPECT_TRUE(drive.has_event("realigned"));
+}
+
+/// What LIO cannot have drifted and says that it did not slide.
+TEST_P(SmoothMode, gives_in_to_fixes_that_agree_for_five_minutes_however_long_it_was_right) {
+  settings.duration_s = 600.0;
+  settings.has_fix = [](double at_s) { return at_s < 200.0 || at_s >= 210.0; };
+  settings.lio_jump_at_s = 205.0;
+  settings.lio_jump_m = 12.0 * aside;
+  LyingDrive drive(settings);
+  drive.run();
+  EXPECT_TRUE(drive.has_event("realigned"));
+  EXPECT_LT(drive.worst(0, 1, 560.0), 0.15);
+}
+
 /// Late by half a second, three in ten by up to as much again.
 double shuffling_delay_s(std::size_t fix) {
   return 0.5 + (fix % 10 < 3 ? 0.1 + 0.17 * static_cast<double>(fix % 4) : 0.0);

@@ -266,6 +266,40 @@ TEST_P(Clock, that_is_one_gives_the_same_bits_whatever_is_assumed_of_others) {
   }
 }
 
+/// Later than a clock may seem to be off, but their stamps go on.
+TEST_P(Clock, is_not_doubted_for_fixes_that_come_late_behind_newer_ones) {
+  const auto truth = drive(town(1.5, 3.0), 40.0);
+  Sensors sensors = rtk_robot();
+  sensors.latency_s = 0.63;
+  auto inputs = sense(truth, sensors, 5);
+  int fixes = 0;
+  for (Input& input : inputs) {
+    if (input.is_fix) {
+      input.available_s += ++fixes % 3 == 0 ? 0.45 : 0.0;
+    }
+  }
+  std::stable_sort(inputs.begin(), inputs.end(), [](const Input& a, const Input& b) {
+    return a.available_s < b.available_s;
+  });
+  GpsOdometry filter(config_with_datum(GetParam()), sensors.robot);
+  const Recorded result = run(filter, inputs, truth);
+  EXPECT_FALSE(has_event(result.events, "gnss_clock_moved"));
+  EXPECT_GT(filter.status().fixes_accepted + 10U, filter.status().fixes_received);
+}
+
+TEST(ClockOffset, takes_a_fix_that_fills_a_gap_for_late_and_not_for_another_clock) {
+  Clocks clocks;
+  clocks.run(0.0, 20.0, 0.0);
+  // That of 20.0 s is missing and comes behind 20.8 s; stamps that were there, or lie anywhere
+  // between, are those of a clock that went back.
+  clocks.run(20.2, 21.0, 0.0);
+  ClockOffset was_there = clocks.offset;
+  ClockOffset between = clocks.offset;
+  EXPECT_EQ(clocks.offset.place(stamp_of(20.0), stamp_of(21.2)).stamp_ns, stamp_of(20.0));
+  EXPECT_EQ(was_there.place(stamp_of(19.8), stamp_of(21.2)).reason, "clock_jump");
+  EXPECT_EQ(between.place(stamp_of(19.9), stamp_of(21.2)).reason, "clock_jump");
+}
+
 INSTANTIATE_TEST_SUITE_P(Filters, Clock, testing::Values("ekf15", "eskf18"));
 
 }  // namespace

@@ -86,4 +86,22 @@ Alignment alignment_at(std::uint32_t odom_epoch,
   return alignment;
 }
 
+Alignment moved_aside(const LioStatus& now,
+                      const Eigen::Vector3d& here_odom_m,
+                      const Eigen::Vector2d& aside_map_m,
+                      const Eigen::Matrix2d& covariance_m2) {
+  const Odometry present = place(here_odom_m, now.T_map_odom, now.T_map_odom_covariance);
+  Eigen::Vector3d here_map_m = present.T_frame_child.p;
+  here_map_m.head<2>() += aside_map_m;
+  Eigen::Matrix3d here_covariance_m2 = Eigen::Matrix3d::Zero();
+  here_covariance_m2.topLeftCorner<2, 2>() = covariance_m2;
+  here_covariance_m2(2, 2) = present.pose_covariance(2, 2);
+  return alignment_at(now.odom_epoch,
+                      now.T_map_odom.yaw_rad,
+                      now.T_map_odom_covariance(0, 0),
+                      here_odom_m,
+                      here_map_m,
+                      here_covariance_m2);
+}
+
 }  // namespace trigpoint::fusion_gate

@@ -51,4 +51,11 @@ Alignment alignment_at(std::uint32_t odom_epoch,
                        const Eigen::Vector3d& here_map_m,
                        const Eigen::Matrix3d& here_covariance_m2);
 
+/// An alignment that puts the robot (base_link at `here_odom_m`) by `aside_map_m` east and north of
+/// where T_map_odom puts it, with their covariance; yaw and height stay as they are.
+Alignment moved_aside(const LioStatus& now,
+                      const Eigen::Vector3d& here_odom_m,
+                      const Eigen::Vector2d& aside_map_m,
+                      const Eigen::Matrix2d& covariance_m2);
+
 }  // namespace trigpoint::fusion_gate

@@ -62,4 +62,8 @@ std::optional<Refusal> check_age(const AcceptedFix& fix,
   return Refusal{"late", sentence("fix is %.2f s behind LIO, limit %.2f s", age_s, max_age_s)};
 }
 
+std::string refused_code(const std::string& reason) {
+  return "refused_by_filter_" + reason;
+}
+
 }  // namespace trigpoint::fusion_gate

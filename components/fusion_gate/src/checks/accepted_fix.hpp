@@ -41,4 +41,10 @@ std::optional<Refusal> check_age(const AcceptedFix& fix,
 
 const char* name_of(GpsHealth health);
 
+/// Of a fix that the GPS filter refused.
+std::string refused_code(const std::string& reason);
+
+/// Its reason where it was too far from where the filter expected it.
+inline constexpr const char* kFilterGate = "gate";
+
 }  // namespace trigpoint::fusion_gate

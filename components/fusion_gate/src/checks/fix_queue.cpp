@@ -32,6 +32,10 @@ void FixQueue::hear(Nanoseconds stamp_ns, Nanoseconds now_ns) {
   know(stamp_ns, now_ns + kUntilTold_ns);
 }
 
+bool FixQueue::is_far_ahead(Nanoseconds stamp_ns, Nanoseconds now_ns) {
+  return now_ns > 0 && stamp_ns > now_ns + kFarthestAhead_ns;
+}
+
 void FixQueue::put(const ToldFix& told) {
   know(told.fix.stamp_ns, 0);
   const auto place = std::lower_bound(waiting_.begin(), waiting_.end(), told, is_earlier);

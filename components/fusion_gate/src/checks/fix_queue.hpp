@@ -31,6 +31,9 @@ class FixQueue {
   /// any; stamps far ahead of it are not heard.
   void hear(Nanoseconds stamp_ns, Nanoseconds now_ns);
 
+  /// A stamp beyond every clock's error: nothing with it may wait, it would wait for ever.
+  static bool is_far_ahead(Nanoseconds stamp_ns, Nanoseconds now_ns);
+
   /// Adds a fix, or changes what is held of one that waits.
   void put(const ToldFix& told);
 

@@ -21,10 +21,12 @@ constexpr double kScatterWindow_s = 30.0;
 constexpr std::size_t kScatterFixes = 10;
 constexpr double kNewSolution_s = 5.0;  // after such a silence the receiver began anew
 constexpr double kJump_s = 1.0;
+constexpr std::size_t kRefusedKept = 32;
 constexpr double kUnbrokenGap_s = 2.0;  // a longer silence confirms nothing
 // An alignment that was confirmed is given up only for fixes that agree against it for much longer.
 constexpr double kLongContradiction_s = 120.0;
 constexpr double kLongerThanConfirmed = 2.0;
+constexpr double kLongestContradiction_s = 300.0;  // nor does a drive of hours outweigh so many
 
 }  // namespace
 
@@ -32,7 +34,8 @@ FixMonitor::FixMonitor(const Config& config, const Eigen::Vector3d& antenna_posi
     : config_(config),
       lever_arm_base_m_(antenna_position_base_m),
       trusts_{Trust(config, Part::kLevel), Trust(config, Part::kHeight)},
-      rival_(config.alignment) {}
+      rival_(config.alignment),
+      settling_(config) {}
 
 void FixMonitor::on_lio_status(const LioStatus& lio, double distance_m) {
   const double moved_m = std::max(0.0, distance_m - lio_distance_m_);
@@ -53,12 +56,23 @@ bool FixMonitor::is_blind(const LioStatus& lio, int axis_map) const {
 }
 
 Eigen::Vector3d FixMonitor::blind_variance_map_m2(const LioStatus& lio) const {
-  Eigen::Vector3d since_odom_m = Eigen::Vector3d::Zero();
-  if (const auto& last = last_trusted_[index_of(Part::kLevel)]) {
-    since_odom_m = blind_m_ - last->blind_m;
-  }
   const Eigen::Matrix3d R_map_odom = lio.T_map_odom.pose().q.toRotationMatrix();
-  return R_map_odom.cwiseAbs2() * since_odom_m.cwiseAbs2();
+  Eigen::Vector3d result = Eigen::Vector3d::Zero();
+  for (int axis = 0; axis < 3; ++axis) {
+    if (const auto& last = last_row_[static_cast<std::size_t>(axis)]) {
+      const Eigen::Vector3d since_odom_m = blind_m_ - last->blind_m;
+      result[axis] = R_map_odom.row(axis).cwiseAbs2().dot(since_odom_m.cwiseAbs2().transpose());
+    }
+  }
+  return result;
+}
+
+void FixMonitor::on_rows(const std::array<bool, 3>& axes) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (axes[axis]) {
+      last_row_[axis] = sightings_.back();
+    }
+  }
 }
 
 Eigen::Vector3d FixMonitor::scatter_map_m2(const LioStatus& lio) const {
@@ -105,12 +119,10 @@ Sighting FixMonitor::sighting_of(const Witness& witness) const {
   return sighting;
 }
 
-/// The row's innovation. Covariance: the fix's, T_map_odom's and the scan's at the antenna, and
-/// what LIO may have drifted beyond the mapper's random walk since a fix was trusted.
-Difference FixMonitor::level_difference(const AcceptedFix& fix,
-                                        const Sighting& sighting,
-                                        const LioStatus& lio,
-                                        Part part) const {
+/// The row's innovation. Covariance: the fix's, T_map_odom's and the scan's at the antenna.
+Difference FixMonitor::offset_of(const AcceptedFix& fix,
+                                 const Sighting& sighting,
+                                 const LioStatus& lio) const {
   Odometry antenna;
   antenna.T_frame_child.p = sighting.lio_odom_m;
   antenna.pose_covariance.setZero();
@@ -123,15 +135,56 @@ Difference FixMonitor::level_difference(const AcceptedFix& fix,
   result.d_map_m = fix.antenna_map_m - in_map.T_frame_child.p;
   result.covariance_m2 = in_map.pose_covariance.topLeftCorner<3, 3>() +
                          floored(fix.covariance_map_m2, config_.min_sigma_m);
+  return result;
+}
+
+/// Beyond the mapper's random walk: what LIO may have drifted since a fix was trusted, and what
+/// that one was off.
+Eigen::Matrix3d FixMonitor::lio_may_be_off_m2(const Sighting& sighting,
+                                              const LioStatus& lio,
+                                              Part part) const {
+  Eigen::Matrix3d result = unsettled_m2_.asDiagonal();
   if (const auto& last = last_trusted_[index_of(part)]) {
     const Eigen::Matrix3d R_map_odom = lio.T_map_odom.pose().q.toRotationMatrix();
     const Eigen::Vector3d drift_m2 =
         lio_drift_variance_m2((sighting.blind_m - last->blind_m).cwiseAbs(),
                               std::max(0.0, sighting.distance_m - last->distance_m),
                               config_);
-    result.covariance_m2 += R_map_odom * drift_m2.asDiagonal() * R_map_odom.transpose();
+    result += R_map_odom * drift_m2.asDiagonal() * R_map_odom.transpose();
   }
   return result;
+}
+
+Difference FixMonitor::level_difference(const AcceptedFix& fix,
+                                        const Sighting& sighting,
+                                        const LioStatus& lio,
+                                        Part part) const {
+  Difference result = offset_of(fix, sighting, lio);
+  result.covariance_m2 += lio_may_be_off_m2(sighting, lio, part);
+  return result;
+}
+
+/// A believed fix need not have moved T_map_odom: its row may have had no weight, or there was
+/// none. What it was off, as far as LIO may be, stays permitted until it is taken in.
+void FixMonitor::note_trusted(const Witness& witness,
+                              const Sighting& sighting,
+                              const LioStatus& lio,
+                              MonitorOutcome& outcome) {
+  const Difference off_by = offset_of(witness.raw ? *witness.raw : witness.fix, sighting, lio);
+  for (const Part part : kParts) {
+    if (!outcome.trusted[index_of(part)]) {
+      continue;
+    }
+    const Eigen::Vector3d may_m2 = lio_may_be_off_m2(sighting, lio, part).diagonal();
+    for (int axis = part == Part::kLevel ? 0 : 2; axis < (part == Part::kLevel ? 2 : 3); ++axis) {
+      unsettled_m2_[axis] = std::min(may_m2[axis], off_by.d_map_m[axis] * off_by.d_map_m[axis]);
+    }
+  }
+  if (!outcome.trusted[0] || is_blind(lio, 0) || is_blind(lio, 1)) {
+    settling_.interrupt();
+  } else {
+    outcome.slid_map_m = settling_.add(sighting.stamp_ns, off_by);
+  }
 }
 
 const Sighting* FixMonitor::trusted_before(Nanoseconds stamp_ns, double window_s, Part part) const {
@@ -202,13 +255,22 @@ std::optional<Nanoseconds> FixMonitor::taken_in_since(const Sighting& sighting,
   return std::nullopt;
 }
 
+/// After a silence the receiver began anew, and a new solution may be as wrong as the old one: it
+/// does not overthrow an alignment by one jump. One that goes on where the doubted fixes before the
+/// silence left off is no new one.
+bool FixMonitor::is_new_solution(const Sighting& sighting, const LioStatus& lio) const {
+  const Trust& level = trust(Part::kLevel);
+  return level.trusted() ||
+         sigmas_of(compare_displacement(level.stretch().back(), sighting, lio, config_),
+                   Part::kLevel) > config_.smooth.enter_sigmas;
+}
+
 MonitorOutcome FixMonitor::judge(const Witness& witness, const LioStatus& lio) {
   Sighting sighting = sighting_of(witness);
-  // After a silence the receiver began anew, and a new solution may be as wrong as the old one: it
-  // does not overthrow an alignment by one jump.
   if (!sightings_.empty() &&
       to_seconds(sighting.stamp_ns - sightings_.back().stamp_ns) > kNewSolution_s) {
-    confirmed_s_ += config_.smooth.probation_s;
+    confirmed_s_ += is_new_solution(sighting, lio) ? config_.smooth.probation_s : 0.0;
+    settling_.begin();
   }
   MonitorOutcome outcome;
   for (const Part part : kParts) {
@@ -220,6 +282,10 @@ MonitorOutcome FixMonitor::judge(const Witness& witness, const LioStatus& lio) {
       forget_since(outcome.taken_in_since_ns[k].value_or(sighting.stamp_ns), part);
     }
   }
+  if (outcome.change[0] == Trust::Change::kDoubted) {
+    begin_with_refused(sighting, lio);
+  }
+  refused_.clear();
   // A reflection that spoils east and north spoils the height; a wrong height alone spoils nothing.
   outcome.trusted[0] = trusts_[0].trusted();
   outcome.trusted[1] = trusts_[1].trusted() && outcome.trusted[0];
@@ -227,6 +293,7 @@ MonitorOutcome FixMonitor::judge(const Witness& witness, const LioStatus& lio) {
     const double since_s = to_seconds(sighting.stamp_ns - last_trusted_[0]->stamp_ns);
     confirmed_s_ += since_s <= kUnbrokenGap_s ? std::max(0.0, since_s) : 0.0;
   }
+  note_trusted(witness, sighting, lio, outcome);
   for (const Part part : kParts) {
     if (outcome.trusted[index_of(part)]) {
       sighting.used[index_of(part)] = true;
@@ -240,12 +307,30 @@ MonitorOutcome FixMonitor::judge(const Witness& witness, const LioStatus& lio) {
   return outcome;
 }
 
+void FixMonitor::on_refused(const Witness& witness) {
+  refused_.push_back(sighting_of(witness));
+  if (refused_.size() > kRefusedKept) {
+    refused_.pop_front();
+  }
+}
+
+/// A jump that the GPS filter found first is as old as the first fix that it refused for it.
+void FixMonitor::begin_with_refused(const Sighting& sighting, const LioStatus& lio) {
+  const auto first = std::find_if(refused_.begin(), refused_.end(), [&](const Sighting& s) {
+    return to_seconds(sighting.stamp_ns - s.stamp_ns) <= kJump_s &&
+           sigmas_of(compare_displacement(s, sighting, lio, config_), Part::kLevel) <=
+               config_.smooth.enter_sigmas;
+  });
+  if (first != refused_.end()) {
+    trusts_[index_of(Part::kLevel)].begin_earlier(*first);
+  }
+}
+
 void FixMonitor::on_alignment(const Witness& witness) {
   Sighting sighting = sighting_of(witness);
   sighting.used = {true, true};
-  for (auto& last : last_trusted_) {
-    last = sighting;
-  }
+  last_trusted_.fill(sighting);
+  last_row_.fill(sighting);
   keep(sighting);
 }
 
@@ -280,8 +365,9 @@ std::optional<AlignmentSolution> FixMonitor::rival_of(const Sighting& sighting, 
   // Fixes that first moved unlike LIO are liars themselves; the end of a wrong fix is one jump.
   const bool jumped = to_seconds(first.stamp_ns - doubt.since_ns()) <= kJump_s;
   const bool on_probation = jumped && confirmed_s_ < config_.smooth.probation_s;
-  const bool outlives = doubted == Part::kLevel && agreed_s > kLongContradiction_s &&
-                        agreed_s > kLongerThanConfirmed * confirmed_s_;
+  const bool outlives =
+      doubted == Part::kLevel && agreed_s > kLongContradiction_s &&
+      agreed_s > std::min(kLongerThanConfirmed * confirmed_s_, kLongestContradiction_s);
   const bool is_long_enough = sighting.distance_m - first.distance_m >= config_.smooth.realign_m;
   const bool is_off = doubt.reason().code == "off_level";
   if (rival_.admitted() && is_off && is_long_enough && (on_probation || outlives)) {
@@ -297,6 +383,10 @@ void FixMonitor::begin_anew() {
   sightings_.clear();
   rival_.clear();
   last_trusted_ = {};
+  last_row_ = {};
+  unsettled_m2_.setZero();
+  settling_.end();
+  refused_.clear();
   confirmed_s_ = 0.0;
 }
 

@@ -10,6 +10,7 @@
 #include "checks/accepted_fix.hpp"
 #include "checks/displacement.hpp"
 #include "checks/sighting.hpp"
+#include "control/settling.hpp"
 #include "control/trust.hpp"
 
 #include <array>
@@ -32,6 +33,8 @@ struct MonitorOutcome {
   /// By part: what was believed since then was wrong.
   std::array<std::optional<Nanoseconds>, 2> taken_in_since_ns;
   std::optional<AlignmentSolution> realignment;  ///< the alignment itself was wrong
+  /// East and north by which trusted fixes contradict T_map_odom's own covariance after a silence.
+  std::optional<Eigen::Vector3d> slid_map_m;
 };
 
 /// Mode smooth's tests of the values: each fix against the pose in map and, over 2, 10 and 30 s,
@@ -46,12 +49,22 @@ class FixMonitor {
   /// The mapper is aligned.
   MonitorOutcome judge(const Witness& witness, const LioStatus& lio);
 
+  /// The GPS filter refused the fix for what it says. It is no evidence for the pose, but what the
+  /// receiver said counts when the next one says it again. `witness.raw` is known.
+  void on_refused(const Witness& witness);
+
   /// The fixes that the alignment rests on are trusted ones.
   void on_alignment(const Witness& witness);
 
   const Trust& trust(Part part) const { return trusts_[index_of(part)]; }
 
-  /// Variance along the axes of map that LIO gained by driving blind since the last trusted fix.
+  /// Rows of the fix that was judged last went to the mapper along these axes of map.
+  void on_rows(const std::array<bool, 3>& axes);
+
+  /// T_map_odom was put where the fixes say.
+  void on_settled() { unsettled_m2_.head<2>().setZero(); }
+
+  /// Variance along the axes of map that LIO gained by driving blind since the last row along them.
   Eigen::Vector3d blind_variance_map_m2(const LioStatus& lio) const;
 
   bool is_blind(const LioStatus& lio, int axis_map) const;
@@ -69,6 +82,18 @@ class FixMonitor {
 
  private:
   Sighting sighting_of(const Witness& witness) const;
+  Difference offset_of(const AcceptedFix& fix,
+                       const Sighting& sighting,
+                       const LioStatus& lio) const;
+  Eigen::Matrix3d lio_may_be_off_m2(const Sighting& sighting,
+                                    const LioStatus& lio,
+                                    Part part) const;
+  void note_trusted(const Witness& witness,
+                    const Sighting& sighting,
+                    const LioStatus& lio,
+                    MonitorOutcome& outcome);
+  void begin_with_refused(const Sighting& sighting, const LioStatus& lio);
+  bool is_new_solution(const Sighting& sighting, const LioStatus& lio) const;
   Difference level_difference(const AcceptedFix& fix,
                               const Sighting& sighting,
                               const LioStatus& lio,
@@ -93,7 +118,12 @@ class FixMonitor {
   Eigen::Vector3d blind_m_{Eigen::Vector3d::Zero()};  // axes of odom, summed up
   double lio_distance_m_{0.0};
   std::array<std::optional<Sighting>, 2> last_trusted_;
-  double confirmed_s_{0.0};  // time for which fixes confirmed the alignment
+  std::array<std::optional<Sighting>, 3> last_row_;  // by axis of map
+  // By how much trusted fixes are still off T_map_odom: believed, and not yet taken in.
+  Eigen::Vector3d unsettled_m2_{Eigen::Vector3d::Zero()};
+  Settling settling_;
+  std::deque<Sighting> refused_;  // by the filter, since a fix was judged
+  double confirmed_s_{0.0};       // time for which fixes confirmed the alignment
 };
 
 }  // namespace trigpoint::fusion_gate

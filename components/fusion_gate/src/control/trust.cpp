@@ -24,6 +24,7 @@ Trust::Change Trust::judge(const Sighting& sighting, const Tests& tests, const L
     doubt_ = sighting.stamp_ns;
     reason_ = *tests.contradiction;
     stretch_ = {sighting};
+    began_ = true;
     return Change::kDoubted;
   }
   prolong_stretch(sighting, lio);
@@ -43,6 +44,11 @@ Trust::Change Trust::judge(const Sighting& sighting, const Tests& tests, const L
   return Change::kNone;
 }
 
+void Trust::begin_earlier(const Sighting& first) {
+  doubt_ = first.stamp_ns;
+  stretch_.insert(stretch_.begin(), first);
+}
+
 void Trust::begin_anew() {
   doubt_.reset();
   reason_ = {};
@@ -57,6 +63,7 @@ void Trust::prolong_stretch(const Sighting& sighting, const LioStatus& lio) {
   if (stretch_.empty() || !agrees_with(stretch_.front()) || !agrees_with(stretch_.back())) {
     stretch_.clear();
   }
+  began_ = stretch_.empty();
   stretch_.push_back(sighting);
   if (stretch_.size() > kStretchKept) {
     stretch_.erase(stretch_.begin() + 1);

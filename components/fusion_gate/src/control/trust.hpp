@@ -44,7 +44,10 @@ class Trust {
   const std::vector<Sighting>& stretch() const { return stretch_; }
 
   /// True when the newest fix began the stretch.
-  bool stretch_began() const { return stretch_.size() == 1; }
+  bool stretch_began() const { return began_; }
+
+  /// The doubt, and its stretch, began with an earlier fix that nobody judged here.
+  void begin_earlier(const Sighting& first);
 
   void begin_anew();
 
@@ -57,6 +60,7 @@ class Trust {
   std::optional<Nanoseconds> doubt_;  // since
   Refusal reason_;
   std::vector<Sighting> stretch_;  // the first, and the newest ones
+  bool began_{false};
 };
 
 }  // namespace trigpoint::fusion_gate

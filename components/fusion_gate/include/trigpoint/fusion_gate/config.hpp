@@ -49,6 +49,10 @@ struct SmoothConfig {
   double hand_over_radps{0.0174533};
 };
 
+/// Beyond max_fix_age_s, until LIO's next scan covers a fix that was waited for: no row of the gate
+/// is older than both together, and the mapper must keep as much.
+inline constexpr double kJudgingSlack_s = 0.15;
+
 /// The only defaults of fusion_gate; every field is described (unit, rule) in src/config.cpp.
 struct Config {
   std::string mode{"smooth"};                ///< lio, fusion, literal, hard, smooth

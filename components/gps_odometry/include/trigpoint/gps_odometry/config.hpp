@@ -76,13 +76,14 @@ struct Config {
 
   // Fix checks.
   double future_limit_s{0.1};
-  double rewind_s{1.0};
+  double rewind_s{1.5};
   double highest_speed_mps{60.0};
   double recovery_s{5.0};
   double gate_probability{0.999};
   std::int64_t frozen_fixes{3};
 
   // A clock of the fixes that is not the IMU's.
+  double clock_same_s{1.0};
   double clock_latest_s{5.0};
   double clock_latency_s{0.1};
   double clock_latency_sigma_s{0.05};

@@ -32,6 +32,7 @@ struct Step {
   std::vector<lio_mapper::ScanResult> scans;
   std::vector<Odometry> lio_imu_rate;
   std::vector<Odometry> fused;
+  std::vector<Odometry> fused_raw;  ///< before the hand-over
   std::vector<FusionStatus> fusion_status;
   std::vector<StateUpdate> state_updates;
   std::optional<Datum> datum;  ///< elected by this input
