@@ -27,7 +27,10 @@ CycloneReader::CycloneReader(CycloneNode& node,
       events_(std::move(events)),
       message_(type.make()),
       qos_(qos) {
-  reader_ = create();
+  {
+    const std::lock_guard lock(making_mutex_);
+    reader_ = create();
+  }
   // What came before the handle was known.
   on_matched();
   node_.worker().post(this, [this] { take_all(); });
@@ -174,9 +177,13 @@ void CycloneReader::be_incompatible(std::uint32_t policy) {
 }
 
 void CycloneReader::make_anew_as_best_effort() {
-  dds_delete(reader_);
-  qos_.reliability = Reliability::kBestEffort;
-  reader_ = create();
+  {
+    // Cyclone tells of writers that it knows already from inside the constructor's create().
+    const std::lock_guard lock(making_mutex_);
+    dds_delete(reader_);
+    qos_.reliability = Reliability::kBestEffort;
+    reader_ = create();
+  }
   update_writers();
   take_all();
   node_.tell(best_effort_event(dds_topic_));

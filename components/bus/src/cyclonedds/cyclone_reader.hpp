@@ -55,6 +55,7 @@ class CycloneReader : public backend::Reader {
   std::atomic<dds_entity_t> reader_{0};
   Qos qos_;  ///< of the worker, once the constructor is through
 
+  std::mutex making_mutex_;    ///< while the handle is not stored; listeners do not take it
   std::mutex callback_mutex_;  ///< one callback at a time, none after the destructor
   bool closed_{false};
   std::map<dds_instance_handle_t, std::string> writers_;  ///< GUIDs of those that were told
