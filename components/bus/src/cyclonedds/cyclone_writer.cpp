@@ -59,7 +59,10 @@ CycloneWriter::~CycloneWriter() {
   if (paced_ != nullptr) {
     paced_->cancel(writer_);
   }
-  dds_delete(writer_);  // when it returns no listener runs
+  {
+    const OwnCall call;
+    dds_delete(writer_);  // when it returns no listener runs
+  }
   node_.worker().cancel(this);
 }
 

@@ -2,6 +2,8 @@
 // Copyright the Trigpoint developers
 #include "paced_sender.hpp"
 
+#include "endpoint.hpp"
+
 #include <algorithm>
 #include <utility>
 
@@ -74,7 +76,10 @@ void PacedSender::work() {
     waiting_.pop_front();
     sending_ = next.writer;
     lock.unlock();
-    next.data.forward_to(next.writer);
+    {
+      const OwnCall call;
+      next.data.forward_to(next.writer);
+    }
     lock.lock();
     sending_.reset();
     changed_.notify_all();
