@@ -33,7 +33,7 @@ CycloneReader::CycloneReader(CycloneNode& node,
   }
   // What came before the handle was known.
   on_matched();
-  node_.worker().post(this, [this] { take_all(); });
+  take_on_worker();
 }
 
 CycloneReader::~CycloneReader() {
@@ -67,10 +67,21 @@ dds_entity_t CycloneReader::create() {
 }
 
 void CycloneReader::on_data_available() {
-  if (OwnCall::is_on_this_thread()) {  // a writer of this participant is in dds_write
-    node_.worker().post(this, [this] { take_all(); });
+  if (OwnCall::is_on_this_thread() || *topic_.is_written_here) {
+    take_on_worker();
   } else {
     take_all();
+  }
+}
+
+/// Cyclone calls a reader's listeners one at a time, and dds_write of the same participant waits
+/// for its turn; a callback in a listener that waits for whoever writes would wait for ever.
+void CycloneReader::take_on_worker() {
+  if (!take_is_posted_.exchange(true)) {
+    node_.worker().post(this, [this] {
+      take_is_posted_ = false;
+      take_all();
+    });
   }
 }
 

@@ -28,6 +28,7 @@ class CycloneReader : public backend::Reader {
  private:
   // On a thread of Cyclone's, or on ours inside a call of ours.
   void on_data_available();
+  void take_on_worker();
   void on_matched();
   void on_incompatible_qos(std::uint32_t policy);
 
@@ -52,6 +53,7 @@ class CycloneReader : public backend::Reader {
   const std::shared_ptr<void> message_;  ///< reused for every sample
   std::atomic<std::uint64_t> malformed_{0};
   std::atomic<int> matched_{0};
+  std::atomic<bool> take_is_posted_{false};
   std::atomic<dds_entity_t> reader_{0};
   Qos qos_;  ///< of the worker, once the constructor is through
 
