@@ -92,7 +92,19 @@ void CycloneNode::tell(const Event& event) const {
   }
 }
 
-/// At the first, second, fourth, eighth, ... so that a stream of them does not flood the log.
+// At the first, second, fourth, eighth, ... so that a stream of them does not flood the log.
+
+void CycloneNode::tell_of_unknown_writer(const std::string& dds_topic) {
+  const std::uint64_t count = ++of_unknown_writer_;
+  if (std::has_single_bit(count)) {
+    tell({Severity::kWarning,
+          0,
+          "bus_unknown_writer",
+          "a sample on " + dds_topic + " was dropped, since its writer went before it was known; " +
+              std::to_string(count) + " so far"});
+  }
+}
+
 void CycloneNode::tell_not_sent(std::size_t size_bytes, dds_return_t why) {
   const std::uint64_t count = ++not_sent_;
   if (std::has_single_bit(count)) {

@@ -61,6 +61,8 @@ class CycloneReader : public backend::Reader {
   std::mutex callback_mutex_;  ///< one callback at a time, none after the destructor
   bool closed_{false};
   std::map<dds_instance_handle_t, std::string> writers_;  ///< GUIDs of those that were told
+  std::map<dds_instance_handle_t, std::string> guids_;    ///< also of some that have gone, whose
+                                                          ///< samples may still wait
 };
 
 }  // namespace trigpoint::bus::cyclonedds

@@ -18,6 +18,7 @@ constexpr std::size_t kMostInterfaces = 4;  // Cyclone 0.10 cannot use more
 constexpr int kHighestIndex = 119;   // of a participant: above, ports belong to the next domain
 constexpr int kFirstIndexPort = 10;  // discovery of participant 0, above the domain's first
 constexpr std::int64_t kHeaders_bytes = 128;  // of RTPS in front of a fragment, generously
+constexpr int kMostIncomplete = 2;  // samples of a writer, each of up to the largest message
 constexpr std::int64_t kLargestFragment_bytes = 64'000;
 
 std::string element(const std::string& name, const std::string& content) {
@@ -121,6 +122,8 @@ std::string internal(const Config& config, const SocketBuffers& buffers) {
                      element("AutoReschedNackDelay", heartbeat) +
                      element("WriterLingerDuration", kLinger.count(), "ms") +
                      element("MaxSampleSize", kLargestMessage_bytes, "B") +
+                     element("DefragReliableMaxSamples", kMostIncomplete) +
+                     element("DefragUnreliableMaxSamples", kMostIncomplete) +
                      (is_small(buffers) ? repair_burst : ""));
 }
 
