@@ -159,5 +159,38 @@ TEST(Callback, that_waits_for_the_loop_lets_the_loop_publish_on_its_topic) {
   EXPECT_TRUE(heard.wait_for(2));
 }
 
+TEST(Samples, whose_writer_went_unseen_are_dropped_and_told) {
+  Collected<Event> events;
+  Participant here(own_domain(), "here", [&](const Event& event) { events.add(event); });
+  Participant there(own_domain(), "there");
+  std::promise<void> unseen_has_gone;
+  const std::shared_future<void> go_on = unseen_has_gone.get_future().share();
+  Collected<std::string> guids;
+  Readers own_readers;
+  Publisher own(here, topics::fix, own_readers.events());
+  const Subscription<Fix> subscription(
+      here, topics::fix, [&](const auto&, const MessageInfo& info) {
+        guids.add(info.writer_guid);
+        go_on.wait();  // keeps the worker from asking who is there
+      });
+  ASSERT_TRUE(own_readers.wait_for(1));
+  own.publish(Fix{});
+  ASSERT_TRUE(guids.wait_for(1));
+  {
+    Readers readers;
+    Publisher unseen(there, topics::fix, readers.events());
+    ASSERT_TRUE(readers.wait_for(1));
+    unseen.publish(Fix{});
+    EXPECT_TRUE(unseen.wait_for_acknowledgments(kForever));
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));  // until it is known to have gone
+  own.publish(Fix{});
+  unseen_has_gone.set_value();
+  ASSERT_TRUE(guids.wait_for(2));
+  EXPECT_EQ(guids.items(), std::vector<std::string>(2, own.guid()));
+  ASSERT_TRUE(events.wait_for(1));
+  EXPECT_EQ(events.items().back().code, "bus_unknown_writer");
+}
+
 }  // namespace
 }  // namespace trigpoint::bus
