@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <bit>
 #include <stdexcept>
 #include <utility>
 
@@ -32,7 +33,10 @@ CycloneNode::CycloneNode(const Config& config, const std::string& name, EventSin
     : sink_(std::move(sink)) {
   const SocketBuffers buffers = permitted_socket_buffers(config.socket_buffer_bytes);
   if (const auto warning = socket_buffer_warning(config.socket_buffer_bytes, buffers)) {
-    paced_sender_ = std::make_unique<PacedSender>(paced_portion_bytes(buffers), kPacingPeriod);
+    paced_sender_ = std::make_unique<PacedSender>(
+        paced_portion_bytes(buffers),
+        kPacingPeriod,
+        [this](std::size_t size_bytes, dds_return_t why) { tell_not_sent(size_bytes, why); });
     tell(*warning);
   }
   const std::string what =
@@ -85,6 +89,31 @@ std::optional<unsigned> CycloneNode::process_of(const std::string& writer_guid) 
 void CycloneNode::tell(const Event& event) const {
   if (sink_) {
     sink_(event);
+  }
+}
+
+// At the first, second, fourth, eighth, ... so that a stream of them does not flood the log.
+
+void CycloneNode::tell_of_unknown_writer(const std::string& dds_topic) {
+  const std::uint64_t count = ++of_unknown_writer_;
+  if (std::has_single_bit(count)) {
+    tell({Severity::kWarning,
+          0,
+          "bus_unknown_writer",
+          "a sample on " + dds_topic + " was dropped, since its writer went before it was known; " +
+              std::to_string(count) + " so far"});
+  }
+}
+
+void CycloneNode::tell_not_sent(std::size_t size_bytes, dds_return_t why) {
+  const std::uint64_t count = ++not_sent_;
+  if (std::has_single_bit(count)) {
+    tell({Severity::kWarning,
+          0,
+          "bus_sample_not_sent",
+          "a sample of " + std::to_string(size_bytes) + " bytes was not sent: Cyclone DDS says '" +
+              dds_strretcode(why) + "'; at most " + std::to_string(kLargestMessage_bytes) +
+              " bytes can be; " + std::to_string(count) + " so far"});
   }
 }
 

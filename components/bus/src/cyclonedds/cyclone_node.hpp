@@ -8,6 +8,7 @@
 #include "cyclone_type.hpp"
 #include "paced_sender.hpp"
 
+#include <atomic>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -42,6 +43,8 @@ class CycloneNode : public backend::Node {
   PacedSender* paced_sender() { return paced_sender_.get(); }
 
   void tell(const Event& event) const;
+  void tell_of_unknown_writer(const std::string& dds_topic);
+  void tell_not_sent(std::size_t size_bytes, dds_return_t why);
 
  private:
   Topic topic(const std::string& dds_type, const std::string& dds_topic);
@@ -53,6 +56,8 @@ class CycloneNode : public backend::Node {
 
   const EventSink sink_;
   const std::shared_ptr<BufferPool> pool_{std::make_shared<BufferPool>()};
+  std::atomic<std::uint64_t> not_sent_{0};
+  std::atomic<std::uint64_t> of_unknown_writer_{0};
   std::unique_ptr<PacedSender> paced_sender_;  // outlives the messages that name its pacer
   dds_entity_t domain_{0};
   dds_entity_t participant_{0};

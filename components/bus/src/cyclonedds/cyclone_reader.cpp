@@ -7,10 +7,17 @@
 #include "endpoint.hpp"
 
 #include <array>
+#include <exception>
 #include <utility>
 #include <vector>
 
 namespace trigpoint::bus::cyclonedds {
+
+namespace {
+
+constexpr std::size_t kMostGuids = 1024;  // then those of writers that have gone are forgotten
+
+}  // namespace
 
 CycloneReader::CycloneReader(CycloneNode& node,
                              const backend::TypeOps& type,
@@ -27,10 +34,13 @@ CycloneReader::CycloneReader(CycloneNode& node,
       events_(std::move(events)),
       message_(type.make()),
       qos_(qos) {
-  reader_ = create();
+  {
+    const std::lock_guard lock(making_mutex_);
+    reader_ = create();
+  }
   // What came before the handle was known.
   on_matched();
-  node_.worker().post(this, [this] { take_all(); });
+  take_on_worker();
 }
 
 CycloneReader::~CycloneReader() {
@@ -64,10 +74,21 @@ dds_entity_t CycloneReader::create() {
 }
 
 void CycloneReader::on_data_available() {
-  if (OwnCall::is_on_this_thread()) {  // a writer of this participant is in dds_write
-    node_.worker().post(this, [this] { take_all(); });
+  if (OwnCall::is_on_this_thread() || *topic_.is_written_here) {
+    take_on_worker();
   } else {
     take_all();
+  }
+}
+
+/// Cyclone calls a reader's listeners one at a time, and dds_write of the same participant waits
+/// for its turn; a callback in a listener that waits for whoever writes would wait for ever.
+void CycloneReader::take_on_worker() {
+  if (!take_is_posted_.exchange(true)) {
+    node_.worker().post(this, [this] {
+      take_is_posted_ = false;
+      take_all();
+    });
   }
 }
 
@@ -94,6 +115,10 @@ void CycloneReader::take_all() {
 void CycloneReader::deliver(const WireData& data, const dds_sample_info_t& info) {
   MessageInfo told;
   told.writer_guid = guid_of_writer(info.publication_handle);
+  if (told.writer_guid.empty()) {  // nobody could say whose it is
+    node_.tell_of_unknown_writer(dds_topic_);
+    return;
+  }
   if (!type_.deserialize(data.cdr(), message_.get())) {
     if (const auto event = malformed_event(dds_topic_, told.writer_guid, ++malformed_)) {
       node_.tell(*event);
@@ -106,13 +131,17 @@ void CycloneReader::deliver(const WireData& data, const dds_sample_info_t& info)
 }
 
 std::string CycloneReader::guid_of_writer(dds_instance_handle_t writer) {
-  if (const auto known = writers_.find(writer); known != writers_.end()) {
+  if (const auto known = guids_.find(writer); known != guids_.end()) {
     return known->second;
   }
   std::string guid;
   if (dds_builtintopic_endpoint_t* endpoint = dds_get_matched_publication_data(reader_, writer)) {
     guid = guid_text(endpoint->key);
     dds_builtintopic_free_endpoint(endpoint);
+    if (guids_.size() >= kMostGuids) {
+      guids_ = writers_;
+    }
+    guids_.emplace(writer, guid);
   }
   return guid;  // empty: it has gone, and Cyclone with it
 }
@@ -174,9 +203,19 @@ void CycloneReader::be_incompatible(std::uint32_t policy) {
 }
 
 void CycloneReader::make_anew_as_best_effort() {
-  dds_delete(reader_);
-  qos_.reliability = Reliability::kBestEffort;
-  reader_ = create();
+  try {
+    // Cyclone tells of writers that it knows already from inside the constructor's create().
+    const std::lock_guard lock(making_mutex_);
+    dds_delete(reader_.exchange(0));
+    qos_.reliability = Reliability::kBestEffort;
+    reader_ = create();
+  } catch (const std::exception& error) {
+    node_.tell({Severity::kError,
+                0,
+                "bus_reader_lost",
+                "nothing on " + dds_topic_ + " is heard any more: " + error.what()});
+    return;
+  }
   update_writers();
   take_all();
   node_.tell(best_effort_event(dds_topic_));

@@ -28,6 +28,7 @@ class CycloneReader : public backend::Reader {
  private:
   // On a thread of Cyclone's, or on ours inside a call of ours.
   void on_data_available();
+  void take_on_worker();
   void on_matched();
   void on_incompatible_qos(std::uint32_t policy);
 
@@ -52,12 +53,16 @@ class CycloneReader : public backend::Reader {
   const std::shared_ptr<void> message_;  ///< reused for every sample
   std::atomic<std::uint64_t> malformed_{0};
   std::atomic<int> matched_{0};
+  std::atomic<bool> take_is_posted_{false};
   std::atomic<dds_entity_t> reader_{0};
   Qos qos_;  ///< of the worker, once the constructor is through
 
+  std::mutex making_mutex_;    ///< while the handle is not stored; listeners do not take it
   std::mutex callback_mutex_;  ///< one callback at a time, none after the destructor
   bool closed_{false};
   std::map<dds_instance_handle_t, std::string> writers_;  ///< GUIDs of those that were told
+  std::map<dds_instance_handle_t, std::string> guids_;    ///< also of some that have gone, whose
+                                                          ///< samples may still wait
 };
 
 }  // namespace trigpoint::bus::cyclonedds

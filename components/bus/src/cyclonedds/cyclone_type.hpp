@@ -10,6 +10,7 @@
 #include "buffer_pool.hpp"
 #include <dds/dds.h>
 
+#include <atomic>
 #include <memory>
 #include <span>
 #include <string>
@@ -28,6 +29,8 @@ struct WireSample {
 struct Topic {
   dds_entity_t entity{0};             ///< negative: Cyclone's error code
   const ddsi_sertype* type{nullptr};  ///< lives as long as the topic
+  /// The participant has, or had, a writer of it.
+  std::shared_ptr<std::atomic<bool>> is_written_here{std::make_shared<std::atomic<bool>>(false)};
 };
 
 /// Registers the type too.

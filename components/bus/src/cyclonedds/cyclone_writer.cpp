@@ -2,6 +2,7 @@
 // Copyright the Trigpoint developers
 #include "cyclone_writer.hpp"
 
+#include "domain_config.hpp"
 #include "endpoint.hpp"
 
 #include <utility>
@@ -50,26 +51,42 @@ CycloneWriter::CycloneWriter(CycloneNode& node,
         static_cast<CycloneWriter*>(self)->tell_incompatible(status.last_policy_id);
       });
   const QosPointer policies = writer_qos(qos);
+  *topic_.is_written_here = true;
   writer_ =
       checked(dds_create_writer(node.participant(), topic.entity, policies.get(), listener.get()),
               "cannot create a writer of " + type.dds_name);
+  dds_guid_t guid{};
+  dds_get_guid(writer_, &guid);
+  guid_ = guid_text(guid);
 }
 
 CycloneWriter::~CycloneWriter() {
   if (paced_ != nullptr) {
+    paced_->wait_until_sent(writer_, std::chrono::steady_clock::now() + kLinger);
     paced_->cancel(writer_);
   }
-  dds_delete(writer_);  // when it returns no listener runs
+  {
+    const OwnCall call;
+    dds_delete(writer_);  // when it returns no listener runs
+  }
   node_.worker().cancel(this);
 }
 
 bool CycloneWriter::write(const void* value) {
   const WireSample sample{&type_, value};
+  const dds_return_t result = send(sample);
+  if (result != DDS_RETCODE_OK && result != DDS_RETCODE_TIMEOUT) {  // too large, say
+    node_.tell_not_sent(type_.size_bound(value), result);
+  }
+  return result == DDS_RETCODE_OK;
+}
+
+dds_return_t CycloneWriter::send(const WireSample& sample) {
   if (paced_ != nullptr) {
     return paced_->send(writer_, topic_, sample, qos_.depth);
   }
   const OwnCall call;
-  return dds_write(writer_, &sample) == DDS_RETCODE_OK;
+  return dds_write(writer_, &sample);
 }
 
 bool CycloneWriter::wait_for_acknowledgments(std::chrono::nanoseconds timeout) {
@@ -82,20 +99,17 @@ bool CycloneWriter::wait_for_acknowledgments(std::chrono::nanoseconds timeout) {
 }
 
 int CycloneWriter::matched() const {
-  dds_publication_matched_status_t status{};
-  dds_get_publication_matched_status(writer_, &status);
-  return static_cast<int>(status.current_count);
+  return matched_;
 }
 
 std::string CycloneWriter::guid() const {
-  dds_guid_t guid{};
-  dds_get_guid(writer_, &guid);
-  return guid_text(guid);
+  return guid_;
 }
 
 // Cyclone may call from inside a call of ours, so users are told on the worker.
 
 void CycloneWriter::tell_matched(int readers) {
+  matched_ = readers;
   if (events_.readers_changed) {
     node_.worker().post(this, [this, readers] { events_.readers_changed(readers); });
   }

@@ -4,6 +4,9 @@
 
 #include "cyclone_node.hpp"
 
+#include <atomic>
+#include <string>
+
 namespace trigpoint::bus::cyclonedds {
 
 class CycloneWriter : public backend::Writer {
@@ -21,6 +24,7 @@ class CycloneWriter : public backend::Writer {
   std::string guid() const override;
 
  private:
+  dds_return_t send(const WireSample& sample);
   void tell_matched(int readers);
   void tell_incompatible(std::uint32_t policy);
 
@@ -31,6 +35,9 @@ class CycloneWriter : public backend::Writer {
   const PublisherEvents events_;
   PacedSender* const paced_;  ///< of a bulk writer where buffers are small
   dds_entity_t writer_{0};
+  // Cyclone locks a writer while it sends, and a paced cloud may take a second.
+  std::string guid_;
+  std::atomic<int> matched_{0};
 };
 
 }  // namespace trigpoint::bus::cyclonedds

@@ -18,8 +18,8 @@ constexpr std::size_t kMostInterfaces = 4;  // Cyclone 0.10 cannot use more
 constexpr int kHighestIndex = 119;   // of a participant: above, ports belong to the next domain
 constexpr int kFirstIndexPort = 10;  // discovery of participant 0, above the domain's first
 constexpr std::int64_t kHeaders_bytes = 128;  // of RTPS in front of a fragment, generously
+constexpr int kMostIncomplete = 2;  // samples of a writer, each of up to the largest message
 constexpr std::int64_t kLargestFragment_bytes = 64'000;
-constexpr std::int64_t kLargestMessage_bytes = 256'000'000;  // also of what strangers send
 
 std::string element(const std::string& name, const std::string& content) {
   return "<" + name + ">" + content + "</" + name + ">";
@@ -114,16 +114,17 @@ std::string internal(const Config& config, const SocketBuffers& buffers) {
   const std::string heartbeat = milliseconds(config.heartbeat_s);
   const std::string repair_burst =
       element("BurstSize", element("MaxRexmit", paced_portion_bytes(buffers), "B"));
-  return element(
-      "Internal",
-      buffer("SocketReceiveBufferSize", buffers.receive_bytes) +
-          buffer("SocketSendBufferSize", buffers.send_bytes) + "<HeartbeatInterval minsched=\"" +
-          heartbeat + "\" max=\"" + heartbeat + "\">" + heartbeat + "</HeartbeatInterval>" +
-          element("NackDelay", "10ms") + element("AutoReschedNackDelay", heartbeat) +
-          // For the last samples of a writer that goes; longer would add up where readers are dead.
-          element("WriterLingerDuration", "100ms") +
-          element("MaxSampleSize", kLargestMessage_bytes, "B") +
-          (is_small(buffers) ? repair_burst : ""));
+  return element("Internal",
+                 buffer("SocketReceiveBufferSize", buffers.receive_bytes) +
+                     buffer("SocketSendBufferSize", buffers.send_bytes) +
+                     "<HeartbeatInterval minsched=\"" + heartbeat + "\" max=\"" + heartbeat +
+                     "\">" + heartbeat + "</HeartbeatInterval>" + element("NackDelay", "10ms") +
+                     element("AutoReschedNackDelay", heartbeat) +
+                     element("WriterLingerDuration", kLinger.count(), "ms") +
+                     element("MaxSampleSize", kLargestMessage_bytes, "B") +
+                     element("DefragReliableMaxSamples", kMostIncomplete) +
+                     element("DefragUnreliableMaxSamples", kMostIncomplete) +
+                     (is_small(buffers) ? repair_burst : ""));
 }
 
 }  // namespace

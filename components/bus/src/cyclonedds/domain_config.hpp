@@ -7,9 +7,15 @@
 
 #include "../socket_buffers.hpp"
 
+#include <chrono>
 #include <string>
 
 namespace trigpoint::bus::cyclonedds {
+
+inline constexpr std::int64_t kLargestMessage_bytes = 256'000'000;  // also of what strangers send
+
+/// For the last samples of a writer that goes; longer would add up where readers are dead.
+inline constexpr std::chrono::milliseconds kLinger{100};
 
 /// The configuration for dds_create_domain: ours, then that of CYCLONEDDS_URI, which may override
 /// it. Throws std::runtime_error when the interface or a peer is not known.

@@ -2,13 +2,21 @@
 // Copyright the Trigpoint developers
 #include "paced_sender.hpp"
 
+#include "domain_config.hpp"
+#include "endpoint.hpp"
+
 #include <algorithm>
 #include <utility>
 
 namespace trigpoint::bus::cyclonedds {
 
-PacedSender::PacedSender(std::int64_t portion_bytes, std::chrono::milliseconds period)
-    : portion_bytes_(portion_bytes), period_(period), thread_([this] { work(); }) {
+PacedSender::PacedSender(std::int64_t portion_bytes,
+                         std::chrono::milliseconds period,
+                         Refused refused)
+    : portion_bytes_(portion_bytes),
+      period_(period),
+      refused_(std::move(refused)),
+      thread_([this] { work(); }) {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [this] { return pacer_.has_value(); });
 }
@@ -22,13 +30,13 @@ PacedSender::~PacedSender() {
   thread_.join();
 }
 
-bool PacedSender::send(dds_entity_t writer,
-                       const Topic& topic,
-                       const WireSample& sample,
-                       int depth) {
+dds_return_t PacedSender::send(dds_entity_t writer,
+                               const Topic& topic,
+                               const WireSample& sample,
+                               int depth) {
   WireData data(topic, sample, *pacer_);
-  if (!data) {
-    return false;
+  if (!data || data.cdr().size() > static_cast<std::size_t>(kLargestMessage_bytes)) {
+    return DDS_RETCODE_BAD_PARAMETER;
   }
   {
     const std::lock_guard lock(mutex_);
@@ -39,7 +47,7 @@ bool PacedSender::send(dds_entity_t writer,
     waiting_.push_back({writer, std::move(data)});
   }
   changed_.notify_all();
-  return true;
+  return DDS_RETCODE_OK;
 }
 
 bool PacedSender::has_sent_all_of(dds_entity_t writer) const {
@@ -61,6 +69,18 @@ void PacedSender::cancel(dds_entity_t writer) {
   changed_.wait(lock, [&] { return sending_ != writer; });
 }
 
+void PacedSender::forward(Waiting& next) const {
+  const std::size_t size_bytes = next.data.cdr().size();
+  dds_return_t result = DDS_RETCODE_OK;
+  {
+    const OwnCall call;
+    result = next.data.forward_to(next.writer);
+  }
+  if (result != DDS_RETCODE_OK) {
+    refused_(size_bytes, result);
+  }
+}
+
 void PacedSender::work() {
   std::unique_lock lock(mutex_);
   pacer_.emplace(portion_bytes_, period_);
@@ -74,7 +94,7 @@ void PacedSender::work() {
     waiting_.pop_front();
     sending_ = next.writer;
     lock.unlock();
-    next.data.forward_to(next.writer);
+    forward(next);
     lock.lock();
     sending_.reset();
     changed_.notify_all();

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <deque>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -19,11 +20,14 @@ namespace trigpoint::bus::cyclonedds {
 /// oldest.
 class PacedSender {
  public:
-  PacedSender(std::int64_t portion_bytes, std::chrono::milliseconds period);
+  /// A sample that Cyclone refuses later is told on the sender's thread.
+  using Refused = std::function<void(std::size_t size_bytes, dds_return_t why)>;
+
+  PacedSender(std::int64_t portion_bytes, std::chrono::milliseconds period, Refused refused);
   ~PacedSender();
 
-  /// False when the sample cannot be serialised.
-  bool send(dds_entity_t writer, const Topic& topic, const WireSample& sample, int depth);
+  /// An error when the sample cannot be serialised or is too large.
+  dds_return_t send(dds_entity_t writer, const Topic& topic, const WireSample& sample, int depth);
 
   /// Until nothing of this writer waits to be sent; false when that takes longer.
   bool wait_until_sent(dds_entity_t writer, std::chrono::steady_clock::time_point deadline);
@@ -38,6 +42,7 @@ class PacedSender {
   };
 
   void work();
+  void forward(Waiting& next) const;
   bool has_sent_all_of(dds_entity_t writer) const;
 
   std::mutex mutex_;
@@ -47,6 +52,7 @@ class PacedSender {
   bool ended_{false};
   const std::int64_t portion_bytes_;
   const std::chrono::milliseconds period_;
+  const Refused refused_;
   std::optional<Pacer> pacer_;  ///< made by the thread that it holds back
   std::thread thread_;
 };
