@@ -145,6 +145,7 @@ struct FusionGate::Impl {
     Eigen::Vector3d here_odom_m;
     Eigen::Vector3d target_map_m;  // of here
     double first_distance_m;       // from it, when it was sent
+    bool places_anew{false};       // after a slide
   };
 
   FixMonitor monitor;

@@ -89,6 +89,10 @@ void FusionGate::Impl::judge_values(const AcceptedFix& fix,
     return;
   }
   go_back(outcome, witness, out);
+  if (outcome.is_settling) {
+    verdicts.record(fix.stamp_ns, false, "settling", "contradicts T_map_odom after a silence");
+    return;
+  }
   const AxisChoices choices = choose_smoothly(variance_of(fix));
   for (std::size_t axis = 0; axis < 3; ++axis) {
     sigma_passes[axis] = choices[axis].sigma_m <= choices[axis].threshold_m;
@@ -125,6 +129,7 @@ void FusionGate::Impl::go_back(const MonitorOutcome& outcome, const Witness& wit
     return;
   }
   replace(witness, *alignment, out);
+  monitor.on_taken_back(!since[0].has_value());
   tell(out,
        Severity::kWarning,
        "taken_back",
@@ -147,7 +152,7 @@ void FusionGate::Impl::settle(const Eigen::Vector3d& slid_map_m,
                       slid_map_m.head<2>(),
                       covariance_m2.topLeftCorner<2, 2>()),
           out);
-  monitor.on_settled();
+  awaited->places_anew = true;
   placements.clear();
   const std::string text =
       sentence("LIO slid by %.2f m without GPS: east and north are placed anew", off_m);
@@ -161,7 +166,8 @@ void FusionGate::Impl::replace(const Witness& witness, const Alignment& alignmen
   awaited = AwaitedReplacement{now_ns,
                                here_odom_m,
                                target_map_m,
-                               (lio->T_map_odom.pose() * here_odom_m - target_map_m).norm()};
+                               (lio->T_map_odom.pose() * here_odom_m - target_map_m).norm(),
+                               false};
   out.state_updates.push_back(rows.make_alignment(witness.fix, alignment));
 }
 
@@ -181,6 +187,10 @@ bool FusionGate::Impl::is_replacement_awaited(Output& out) {
          Severity::kError,
          "replacement_not_taken",
          "the mapper did not take the T_map_odom that replaces its own");
+  }
+  if (taken && awaited->places_anew) {
+    monitor.on_settled();
+    placements.clear();  // of what the mapper said before it took the new one
   }
   awaited.reset();
   return false;

@@ -43,7 +43,9 @@ struct LyingDriveSettings {
   double fix_latency_s{0.13};
   std::function<double(std::size_t)> delay_s;  ///< besides, by the number of the fix; may be empty
   std::function<bool(double)> is_refused;      ///< by the filter's gate; may be empty: never
-  bool with_records{true};                     ///< the filter tells of all recent fixes
+  double fix_interval_s{0.2};
+  bool sends_no_fix{false};  ///< a message without a position while it has none
+  bool with_records{true};   ///< the filter tells of all recent fixes
 };
 
 struct DriveSample {
@@ -72,7 +74,7 @@ class LyingDrive {
       if (tick % 5 == 0) {
         gps_odometry();
       }
-      if (tick % 20 == 0) {
+      if (tick % std::llround(s_.fix_interval_s / kTick_s) == 0) {
         fix();
       }
       deliver();
@@ -208,8 +210,19 @@ class LyingDrive {
 
   bool fixes_now() const { return !s_.has_fix || s_.has_fix(now_s_); }
 
+  void no_fix() {
+    if (!s_.sends_no_fix) {
+      return;
+    }
+    GnssFix none;
+    none.stamp_ns = stamp(now_s_);
+    none.status = FixStatus::kNoFix;
+    keep(gate_.on_fix(none));
+  }
+
   void fix() {
     if (!fixes_now()) {
+      no_fix();
       return;
     }
     Eigen::Vector3d antenna_m = T_map_base() * robot().antenna_position_base_m + slow_m_ +

@@ -193,30 +193,71 @@ TEST_P(SmoothMode, does_not_lock_itself_out_after_a_drift_of_one_percent) {
   EXPECT_LT(drive.worst(0, 1, 130.0), 0.1);
 }
 
-/// A mapper that is sure of itself, as the real one is, gives rows no weight.
-TEST_P(SmoothMode, is_placed_anew_after_lio_slid_without_gps_where_it_was_blind) {
+/// LIO slides 3 m along its blind axis; the mapper is sure of itself, as the real one is, and gives
+/// rows no weight.
+LyingDriveSettings slides_without_gps(LyingDriveSettings settings) {
   settings.mapper_walk_m_per_sqrt_m = 0.005;
   settings.mapper_knows_blindness = false;
   settings.is_blind = [](double at_s) { return at_s >= 60.0 && at_s < 80.0; };
   settings.lio_jump_at_s = 70.0;
-  settings.lio_jump_m = {3.0, 0.0, 0.0};  // along the blind axis
+  settings.lio_jump_m = {3.0, 0.0, 0.0};
   settings.has_fix = [](double at_s) { return at_s < 55.0 || at_s >= 85.0; };
-  LyingDrive drive(settings);
+  return settings;
+}
+
+double worst_raw_m(const LyingDrive& drive, double from_s) {
+  double worst_m = 0.0;
+  for (const DriveSample& sample : drive.samples) {
+    worst_m =
+        sample.at_s < from_s ? worst_m : std::max(worst_m, sample.raw_error_m.head<2>().norm());
+  }
+  return worst_m;
+}
+
+TEST_P(SmoothMode, is_placed_anew_after_lio_slid_without_gps_where_it_was_blind) {
+  LyingDrive drive(slides_without_gps(settings));
   drive.run();
-  const auto raw_error_m = [&](double from_s) {
-    double worst_m = 0.0;
-    for (const DriveSample& sample : drive.samples) {
-      worst_m =
-          sample.at_s < from_s ? worst_m : std::max(worst_m, sample.raw_error_m.head<2>().norm());
-    }
-    return worst_m;
-  };
   ASSERT_GT(drive.worst(0, 1, 80.0, 85.0), 1.0) << "LIO did slide";
   EXPECT_TRUE(drive.has_event("placed_anew"));
-  EXPECT_LT(raw_error_m(85.0 + 2.0), 0.15);
+  EXPECT_LT(worst_raw_m(drive, 85.0 + 2.0), 0.15);
   EXPECT_LT(drive.worst(0, 1, 102.0), 0.15);
   EXPECT_GT(drive.share_used(0, 90.0, 149.0), 0.95);
   EXPECT_LT(drive.largest_step_m(80.0), kLargestStep_m);
+}
+
+/// However the fixes come back, T_map_odom goes where they say and not past it.
+TEST_P(SmoothMode, is_not_thrown_past_the_truth_after_a_slide_by_late_fixes_or_slow_receivers) {
+  LyingDriveSettings late = slides_without_gps(settings);
+  late.delay_s = [](std::size_t) { return 0.5; };
+  LyingDriveSettings silent = slides_without_gps(settings);
+  silent.sends_no_fix = true;
+  LyingDriveSettings slow = slides_without_gps(settings);
+  slow.fix_interval_s = 1.0;
+  for (LyingDriveSettings variant : {late, silent, slow}) {
+    const double settled_s = 85.0 + 5.0 * variant.fix_interval_s + 1.7;
+    for (const bool honest : {false, true}) {
+      SCOPED_TRACE(testing::Message() << "interval " << variant.fix_interval_s << ", no-fix "
+                                      << variant.sends_no_fix << ", honest mapper " << honest);
+      variant.mapper_knows_blindness = honest;
+      LyingDrive drive(variant);
+      drive.run();
+      EXPECT_LT(worst_raw_m(drive, settled_s), 0.2);
+      EXPECT_TRUE(!honest || !drive.has_event("placed_anew"));
+    }
+  }
+}
+
+TEST_P(SmoothMode, recovers_from_wrong_fixes_that_placed_it_anew_after_a_slide) {
+  LyingDriveSettings wrong = slides_without_gps(settings);
+  const Eigen::Vector3d along_blind_axis = wrong.T_map_odom.pose().q * Eigen::Vector3d::UnitX();
+  wrong.lie_enu_m = [=](double at_s) {
+    return Eigen::Vector3d((at_s >= 85.0 && at_s < 95.0 ? 8.0 : 0.0) * along_blind_axis);
+  };
+  LyingDrive drive(wrong);
+  drive.run();
+  EXPECT_TRUE(drive.has_event("placed_anew"));
+  EXPECT_TRUE(drive.has_event("realigned"));
+  EXPECT_LT(worst_raw_m(drive, 95.0 + 20.0 / wrong.speed_mps), 0.25);
 }
 
 TEST_P(SmoothMode, does_not_take_a_wrong_fix_for_a_slide_when_gps_comes_back_with_it) {
@@ -269,6 +310,18 @@ TEST_P(SmoothMode, gives_in_to_fixes_that_agree_for_five_minutes_however_long_it
   drive.run();
   EXPECT_TRUE(drive.has_event("realigned"));
   EXPECT_LT(drive.worst(0, 1, 560.0), 0.15);
+}
+
+TEST_P(SmoothMode, does_not_give_in_to_a_few_fixes_before_and_after_a_long_silence) {
+  settings.duration_s = 620.0;
+  settings.has_fix = [](double at_s) {
+    return at_s < 200.0 || (at_s >= 210.0 && at_s < 240.0) || at_s >= 560.0;
+  };
+  settings.lio_jump_at_s = 205.0;
+  settings.lio_jump_m = 12.0 * aside;
+  LyingDrive drive(settings);
+  drive.run();
+  EXPECT_FALSE(drive.has_event("realigned"));
 }
 
 /// Late by half a second, three in ten by up to as much again.

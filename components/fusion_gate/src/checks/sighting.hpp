@@ -21,6 +21,8 @@ inline constexpr std::size_t index_of(Part part) {
   return static_cast<std::size_t>(part);
 }
 
+inline constexpr double kUnbrokenGap_s = 2.0;  // a longer silence confirms nothing
+
 /// The antenna at a fix's stamp, as GPS and as LIO saw it.
 struct Sighting {
   Nanoseconds stamp_ns{0};

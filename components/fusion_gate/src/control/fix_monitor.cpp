@@ -22,7 +22,6 @@ constexpr std::size_t kScatterFixes = 10;
 constexpr double kNewSolution_s = 5.0;  // after such a silence the receiver began anew
 constexpr double kJump_s = 1.0;
 constexpr std::size_t kRefusedKept = 32;
-constexpr double kUnbrokenGap_s = 2.0;  // a longer silence confirms nothing
 // An alignment that was confirmed is given up only for fixes that agree against it for much longer.
 constexpr double kLongContradiction_s = 120.0;
 constexpr double kLongerThanConfirmed = 2.0;
@@ -170,7 +169,8 @@ void FixMonitor::note_trusted(const Witness& witness,
                               const Sighting& sighting,
                               const LioStatus& lio,
                               MonitorOutcome& outcome) {
-  const Difference off_by = offset_of(witness.raw ? *witness.raw : witness.fix, sighting, lio);
+  const AcceptedFix& fix = witness.raw ? *witness.raw : witness.fix;
+  const Difference off_by = offset_of(fix, sighting, lio);
   for (const Part part : kParts) {
     if (!outcome.trusted[index_of(part)]) {
       continue;
@@ -182,8 +182,13 @@ void FixMonitor::note_trusted(const Witness& witness,
   }
   if (!outcome.trusted[0] || is_blind(lio, 0) || is_blind(lio, 1)) {
     settling_.interrupt();
-  } else {
-    outcome.slid_map_m = settling_.add(sighting.stamp_ns, off_by);
+  } else if (outcome.change[1] != Trust::Change::kDoubted) {  // else T_map_odom may go back first
+    outcome.slid_map_m =
+        settling_.add(fix, sighting, [&](const AcceptedFix& seen_fix, const Sighting& seen) {
+          return offset_of(seen_fix, seen, lio);
+        });
+    outcome.is_settling =
+        settling_.is_open() && sigmas_of(off_by, Part::kLevel) > config_.smooth.enter_sigmas;
   }
 }
 
@@ -300,6 +305,12 @@ MonitorOutcome FixMonitor::judge(const Witness& witness, const LioStatus& lio) {
       last_trusted_[index_of(part)] = sighting;
     }
   }
+  // A gate that began beside an aligned mapper sent no row yet: LIO's blindness counts from here.
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (!last_row_[axis] && outcome.trusted[index_of(axis < 2 ? Part::kLevel : Part::kHeight)]) {
+      last_row_[axis] = sighting;
+    }
+  }
   keep(sighting);
   if (!trusts_[0].trusted() || !trusts_[1].trusted()) {
     outcome.realignment = rival_of(sighting, trusts_[0].trusted() ? Part::kHeight : Part::kLevel);
@@ -361,14 +372,14 @@ std::optional<AlignmentSolution> FixMonitor::rival_of(const Sighting& sighting, 
               sighting.lio_odom_m,
               sighting.distance_m});
   const Sighting& first = doubt.stretch().front();
-  const double agreed_s = to_seconds(sighting.stamp_ns - first.stamp_ns);
+  const double agreed_s = doubt.agreed_s();
   // Fixes that first moved unlike LIO are liars themselves; the end of a wrong fix is one jump.
   const bool jumped = to_seconds(first.stamp_ns - doubt.since_ns()) <= kJump_s;
   const bool on_probation = jumped && confirmed_s_ < config_.smooth.probation_s;
   const bool outlives =
       doubted == Part::kLevel && agreed_s > kLongContradiction_s &&
       agreed_s > std::min(kLongerThanConfirmed * confirmed_s_, kLongestContradiction_s);
-  const bool is_long_enough = sighting.distance_m - first.distance_m >= config_.smooth.realign_m;
+  const bool is_long_enough = doubt.agreed_m() >= config_.smooth.realign_m;
   const bool is_off = doubt.reason().code == "off_level";
   if (rival_.admitted() && is_off && is_long_enough && (on_probation || outlives)) {
     return rival_.solution();

@@ -35,6 +35,9 @@ struct MonitorOutcome {
   std::optional<AlignmentSolution> realignment;  ///< the alignment itself was wrong
   /// East and north by which trusted fixes contradict T_map_odom's own covariance after a silence.
   std::optional<Eigen::Vector3d> slid_map_m;
+  /// The fix contradicts that covariance and the question is open. A row would turn T_map_odom's
+  /// yaw by what LIO slid.
+  bool is_settling{false};
 };
 
 /// Mode smooth's tests of the values: each fix against the pose in map and, over 2, 10 and 30 s,
@@ -61,8 +64,17 @@ class FixMonitor {
   /// Rows of the fix that was judged last went to the mapper along these axes of map.
   void on_rows(const std::array<bool, 3>& axes);
 
-  /// T_map_odom was put where the fixes say.
-  void on_settled() { unsettled_m2_.head<2>().setZero(); }
+  /// T_map_odom was put where the fixes say: on probation, since they may be wrong.
+  void on_settled() {
+    unsettled_m2_.head<2>().setZero();
+    confirmed_s_ = 0.0;
+  }
+
+  /// T_map_odom went back to where it was: what was believed since then is none of its offsets.
+  void on_taken_back(bool height_only) {
+    unsettled_m2_.tail<1>().setZero();
+    unsettled_m2_.head<2>() *= height_only ? 1.0 : 0.0;
+  }
 
   /// Variance along the axes of map that LIO gained by driving blind since the last row along them.
   Eigen::Vector3d blind_variance_map_m2(const LioStatus& lio) const;
@@ -78,7 +90,11 @@ class FixMonitor {
   void begin_anew();
 
   /// LIO found its place again: displacements across the step mean nothing.
-  void on_odom_step() { sightings_.clear(); }
+  void on_odom_step() {
+    sightings_.clear();
+    refused_.clear();
+    settling_.interrupt();
+  }
 
  private:
   Sighting sighting_of(const Witness& witness) const;

@@ -16,23 +16,30 @@ void Settling::begin() {
 }
 
 void Settling::interrupt() {
-  count_ = 0;
-  sum_map_m_.setZero();
+  seen_.clear();
 }
 
-std::optional<Eigen::Vector3d> Settling::add(Nanoseconds stamp_ns, const Difference& off_by) {
+std::optional<Eigen::Vector3d> Settling::add(const AcceptedFix& fix,
+                                             const Sighting& sighting,
+                                             const OffsetNow& offset_now) {
   if (!is_open_) {
     return std::nullopt;
   }
-  first_ns_ = count_ == 0 ? stamp_ns : first_ns_;
-  ++count_;
-  sum_map_m_ += off_by.d_map_m;
-  if (count_ < config_.smooth.readmit_fixes || to_seconds(stamp_ns - first_ns_) < kShortest_s) {
+  seen_.push_back({fix, sighting});
+  const auto count = static_cast<std::int64_t>(seen_.size());
+  if (count < config_.smooth.readmit_fixes ||
+      to_seconds(sighting.stamp_ns - seen_.front().sighting.stamp_ns) < kShortest_s) {
     return std::nullopt;
   }
+  const Difference newest = offset_now(fix, sighting);
+  Difference mean{Eigen::Vector3d::Zero(), newest.covariance_m2};
+  for (const Seen& seen : seen_) {
+    mean.d_map_m += offset_now(seen.fix, seen.sighting).d_map_m / static_cast<double>(count);
+  }
   end();
-  const Difference mean{sum_map_m_ / static_cast<double>(count_), off_by.covariance_m2};
-  const bool contradicts = sigmas_of(mean, Part::kLevel) > config_.smooth.enter_sigmas;
+  const double limit = config_.smooth.enter_sigmas;
+  const bool contradicts =
+      sigmas_of(newest, Part::kLevel) > limit && sigmas_of(mean, Part::kLevel) > limit;
   return contradicts ? std::optional(mean.d_map_m) : std::nullopt;
 }
 

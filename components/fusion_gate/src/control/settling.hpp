@@ -4,9 +4,13 @@
 
 #include "trigpoint/fusion_gate/config.hpp"
 
+#include "checks/accepted_fix.hpp"
 #include "checks/displacement.hpp"
+#include "checks/sighting.hpp"
 
+#include <functional>
 #include <optional>
+#include <vector>
 
 namespace trigpoint::fusion_gate {
 
@@ -14,6 +18,9 @@ namespace trigpoint::fusion_gate {
 /// mapper that holds itself for certain gives rows no weight, however well the fixes agree.
 class Settling {
  public:
+  /// A fix against the T_map_odom that is in force now, with the covariance that the mapper admits.
+  using OffsetNow = std::function<Difference(const AcceptedFix&, const Sighting&)>;
+
   explicit Settling(const Config& config) : config_(config) {}
 
   /// Fixes came back.
@@ -21,19 +28,27 @@ class Settling {
 
   void end() { is_open_ = false; }
 
+  bool is_open() const { return is_open_; }
+
   /// What was gathered does not count: a fix was doubted, or LIO slides on.
   void interrupt();
 
-  /// `off_by`: a trusted fix against T_map_odom, with the covariance that the mapper admits. Once
-  /// enough agree the question is answered: their mean, if it contradicts that covariance.
-  std::optional<Eigen::Vector3d> add(Nanoseconds stamp_ns, const Difference& off_by);
+  /// A trusted fix. Once there are enough the question is answered: their mean, if it and the
+  /// newest fix contradict that covariance. All are held against the T_map_odom of that moment,
+  /// because it may have followed the rows of the same fixes meanwhile.
+  std::optional<Eigen::Vector3d> add(const AcceptedFix& fix,
+                                     const Sighting& sighting,
+                                     const OffsetNow& offset_now);
 
  private:
+  struct Seen {
+    AcceptedFix fix;
+    Sighting sighting;
+  };
+
   Config config_;
   bool is_open_{false};
-  Nanoseconds first_ns_{0};
-  std::int64_t count_{0};
-  Eigen::Vector3d sum_map_m_{Eigen::Vector3d::Zero()};
+  std::vector<Seen> seen_;
 };
 
 }  // namespace trigpoint::fusion_gate

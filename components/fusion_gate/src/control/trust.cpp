@@ -23,6 +23,7 @@ Trust::Change Trust::judge(const Sighting& sighting, const Tests& tests, const L
     }
     doubt_ = sighting.stamp_ns;
     reason_ = *tests.contradiction;
+    begin_stretch();
     stretch_ = {sighting};
     began_ = true;
     return Change::kDoubted;
@@ -46,13 +47,28 @@ Trust::Change Trust::judge(const Sighting& sighting, const Tests& tests, const L
 
 void Trust::begin_earlier(const Sighting& first) {
   doubt_ = first.stamp_ns;
+  add_agreement(first, stretch_.front());
   stretch_.insert(stretch_.begin(), first);
 }
 
 void Trust::begin_anew() {
   doubt_.reset();
   reason_ = {};
+  begin_stretch();
+}
+
+void Trust::begin_stretch() {
   stretch_.clear();
+  agreed_s_ = 0.0;
+  agreed_m_ = 0.0;
+}
+
+void Trust::add_agreement(const Sighting& from, const Sighting& to) {
+  const double gap_s = to_seconds(to.stamp_ns - from.stamp_ns);
+  if (gap_s > 0.0 && gap_s <= kUnbrokenGap_s) {
+    agreed_s_ += gap_s;
+    agreed_m_ += to.distance_m - from.distance_m;
+  }
 }
 
 void Trust::prolong_stretch(const Sighting& sighting, const LioStatus& lio) {
@@ -61,9 +77,12 @@ void Trust::prolong_stretch(const Sighting& sighting, const LioStatus& lio) {
            config_.smooth.enter_sigmas;
   };
   if (stretch_.empty() || !agrees_with(stretch_.front()) || !agrees_with(stretch_.back())) {
-    stretch_.clear();
+    begin_stretch();
   }
   began_ = stretch_.empty();
+  if (!began_) {
+    add_agreement(stretch_.back(), sighting);
+  }
   stretch_.push_back(sighting);
   if (stretch_.size() > kStretchKept) {
     stretch_.erase(stretch_.begin() + 1);

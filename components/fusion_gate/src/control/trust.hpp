@@ -43,6 +43,11 @@ class Trust {
   /// Fixes that agree with each other, the newest last; only while in doubt.
   const std::vector<Sighting>& stretch() const { return stretch_; }
 
+  /// Time and way over which they agreed; a silence is none of it.
+  double agreed_s() const { return agreed_s_; }
+
+  double agreed_m() const { return agreed_m_; }
+
   /// True when the newest fix began the stretch.
   bool stretch_began() const { return began_; }
 
@@ -52,6 +57,8 @@ class Trust {
   void begin_anew();
 
  private:
+  void begin_stretch();
+  void add_agreement(const Sighting& from, const Sighting& to);
   void prolong_stretch(const Sighting& sighting, const LioStatus& lio);
   bool may_be_readmitted(const Sighting& sighting) const;
 
@@ -61,6 +68,8 @@ class Trust {
   Refusal reason_;
   std::vector<Sighting> stretch_;  // the first, and the newest ones
   bool began_{false};
+  double agreed_s_{0.0};
+  double agreed_m_{0.0};
 };
 
 }  // namespace trigpoint::fusion_gate
