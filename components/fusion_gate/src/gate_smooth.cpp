@@ -29,10 +29,6 @@ Eigen::Matrix3d as_measured(const Eigen::Matrix3d& said_m2,
   return scale.asDiagonal() * said_m2 * scale.asDiagonal();
 }
 
-Part part_of(int axis) {
-  return axis < 2 ? Part::kLevel : Part::kHeight;
-}
-
 }  // namespace
 
 void FusionGate::Impl::remember_raw(const AcceptedFix& fix) {
@@ -143,7 +139,7 @@ void FusionGate::Impl::go_back(const MonitorOutcome& outcome, const Witness& wit
 void FusionGate::Impl::settle(const Eigen::Vector3d& slid_map_m,
                               const Witness& witness,
                               Output& out) {
-  const AcceptedFix& fix = witness.raw ? *witness.raw : witness.fix;
+  const AcceptedFix& fix = witness.as_received();
   const Eigen::Matrix3d covariance_m2 = floored(fix.covariance_map_m2, config.min_sigma_m);
   const double off_m = slid_map_m.head<2>().norm();
   replace(witness,

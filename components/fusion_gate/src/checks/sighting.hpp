@@ -21,6 +21,11 @@ inline constexpr std::size_t index_of(Part part) {
   return static_cast<std::size_t>(part);
 }
 
+/// Of an axis of map.
+inline constexpr Part part_of(int axis) {
+  return axis < 2 ? Part::kLevel : Part::kHeight;
+}
+
 inline constexpr double kUnbrokenGap_s = 2.0;  // a longer silence confirms nothing
 
 /// The antenna at a fix's stamp, as GPS and as LIO saw it.

@@ -78,7 +78,7 @@ Eigen::Vector3d FixMonitor::scatter_map_m2(const LioStatus& lio) const {
   const Eigen::Matrix3d R_map_odom = lio.T_map_odom.pose().q.toRotationMatrix();
   Eigen::Vector3d result = Eigen::Vector3d::Constant(kNaN);
   for (int axis = 0; axis < 3; ++axis) {
-    const std::size_t part = index_of(axis < 2 ? Part::kLevel : Part::kHeight);
+    const std::size_t part = index_of(part_of(axis));
     std::vector<double> offsets_m;
     const Sighting* first = nullptr;
     const Sighting* last = nullptr;
@@ -107,7 +107,7 @@ Eigen::Vector3d FixMonitor::scatter_map_m2(const LioStatus& lio) const {
 }
 
 Sighting FixMonitor::sighting_of(const Witness& witness) const {
-  const AcceptedFix& gps = witness.raw ? *witness.raw : witness.fix;
+  const AcceptedFix& gps = witness.as_received();
   Sighting sighting;
   sighting.stamp_ns = witness.fix.stamp_ns;
   sighting.gps_map_m = gps.antenna_map_m;
@@ -169,15 +169,16 @@ void FixMonitor::note_trusted(const Witness& witness,
                               const Sighting& sighting,
                               const LioStatus& lio,
                               MonitorOutcome& outcome) {
-  const AcceptedFix& fix = witness.raw ? *witness.raw : witness.fix;
+  const AcceptedFix& fix = witness.as_received();
   const Difference off_by = offset_of(fix, sighting, lio);
   for (const Part part : kParts) {
     if (!outcome.trusted[index_of(part)]) {
       continue;
     }
-    const Eigen::Vector3d may_m2 = lio_may_be_off_m2(sighting, lio, part).diagonal();
-    for (int axis = part == Part::kLevel ? 0 : 2; axis < (part == Part::kLevel ? 2 : 3); ++axis) {
-      unsettled_m2_[axis] = std::min(may_m2[axis], off_by.d_map_m[axis] * off_by.d_map_m[axis]);
+    const Eigen::Vector3d most_m2 =
+        lio_may_be_off_m2(sighting, lio, part).diagonal().cwiseMin(off_by.d_map_m.cwiseAbs2());
+    for (int axis = 0; axis < 3; ++axis) {
+      unsettled_m2_[axis] = part_of(axis) == part ? most_m2[axis] : unsettled_m2_[axis];
     }
   }
   if (!outcome.trusted[0] || is_blind(lio, 0) || is_blind(lio, 1)) {
@@ -306,9 +307,10 @@ MonitorOutcome FixMonitor::judge(const Witness& witness, const LioStatus& lio) {
     }
   }
   // A gate that began beside an aligned mapper sent no row yet: LIO's blindness counts from here.
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (!last_row_[axis] && outcome.trusted[index_of(axis < 2 ? Part::kLevel : Part::kHeight)]) {
-      last_row_[axis] = sighting;
+  for (int axis = 0; axis < 3; ++axis) {
+    auto& last = last_row_[static_cast<std::size_t>(axis)];
+    if (!last && outcome.trusted[index_of(part_of(axis))]) {
+      last = sighting;
     }
   }
   keep(sighting);

@@ -24,6 +24,9 @@ struct Witness {
   AcceptedFix fix;                 ///< what would become the row
   std::optional<AcceptedFix> raw;  ///< the receiver's own statement in map, when it is known
   PoseBuffer::Sample lio_pose;     ///< at its stamp
+
+  /// What the receiver said, as far as that is known.
+  const AcceptedFix& as_received() const { return raw ? *raw : fix; }
 };
 
 /// What follows from a fix for T_map_odom.
@@ -72,8 +75,10 @@ class FixMonitor {
 
   /// T_map_odom went back to where it was: what was believed since then is none of its offsets.
   void on_taken_back(bool height_only) {
-    unsettled_m2_.tail<1>().setZero();
-    unsettled_m2_.head<2>() *= height_only ? 1.0 : 0.0;
+    unsettled_m2_.z() = 0.0;
+    if (!height_only) {
+      unsettled_m2_.setZero();
+    }
   }
 
   /// Variance along the axes of map that LIO gained by driving blind since the last row along them.
