@@ -36,14 +36,20 @@ void add_noise(const Vector3d& normal, double weighted_tilt2, Eigen::Matrix3d& n
   noise.diagonal().array() += weighted_tilt2;
 }
 
-/// All of the matrix: half of it takes longer.
+/// The plane's normal stands in the columns of the position. All of the matrix is summed: half of
+/// it takes longer.
 template <int Size>
 void add_row(const typename Information<Size>::Vector& h,
              double weight,
              double residual_m,
+             const PlaneMatch& plane,
              Information<Size>& sum) {
   sum.information.noalias() += (weight * h) * h.transpose();
   sum.gradient += weight * residual_m * h;
+  sum.weight_per_m2 += weight;
+  sum.weighted_thickness2 += weight * plane.thickness2_m2;
+  ++sum.count;
+  add_noise(h.template segment<3>(error::kPosition), weight * plane.tilt2_rad2, sum.noise);
 }
 
 /// Normals are measured too. Along a tunnel none has a true component, but their noise has one, and
@@ -165,11 +171,7 @@ void ScanMatcher::add(Residual& r, const Viewpoint& view, PoseInformation& sum) 
   // d(n . R exp(e) p) / de = (p x R^T n)^T
   Vector6d h;
   h << r.plane.normal, r.point_base_m.cross(normal_base);
-  add_row(h, weight, r.residual_m, sum);
-  sum.weight_per_m2 += weight;
-  sum.weighted_thickness2 += weight * r.plane.thickness2_m2;
-  ++sum.count;
-  add_noise(r.plane.normal, weight * r.plane.tilt2_rad2, sum.noise);
+  add_row(h, weight, r.residual_m, r.plane, sum);
 }
 
 void ScanMatcher::add(Residual& r, const Viewpoint& view, PoseAndExtrinsicInformation& sum) const {
@@ -202,11 +204,7 @@ void ScanMatcher::add(Residual& r, const Viewpoint& view, PoseAndExtrinsicInform
   const double weight = weight_of(r, normal_base.dot(r.direction_base));
   h.segment<3>(error::kPosition) = normal;
   h.segment<3>(error::kRotation) = point_base_m.cross(normal_base);
-  add_row(h, weight, r.residual_m, sum);
-  sum.weight_per_m2 += weight;
-  sum.weighted_thickness2 += weight * r.plane.thickness2_m2;
-  ++sum.count;
-  add_noise(normal, weight * r.plane.tilt2_rad2, sum.noise);
+  add_row(h, weight, r.residual_m, r.plane, sum);
 }
 
 /// Block by block and the blocks in order, so that the sum has the same rounding on any number of
