@@ -22,6 +22,11 @@ std::string address_text(const sockaddr* address) {
 
 }  // namespace
 
+std::string cannot_join(int domain) {
+  return "cannot join DDS domain " + std::to_string(domain) + " (are its UDP ports, from " +
+         std::to_string(first_port(domain)) + ", free, and is there a network interface?)";
+}
+
 std::vector<NetworkInterface> network_interfaces() {
   ifaddrs* list = nullptr;
   if (getifaddrs(&list) != 0) {

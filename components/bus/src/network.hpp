@@ -18,6 +18,9 @@ constexpr int first_port(int domain) {
   return 7400 + 250 * domain;
 }
 
+/// What to say when a middleware does not let us in.
+std::string cannot_join(int domain);
+
 struct NetworkInterface {
   std::string name;
   std::string address;  ///< IPv4

@@ -6,6 +6,10 @@
 
 namespace trigpoint::bus {
 
+bool is_told(std::uint64_t count) {
+  return std::has_single_bit(count);
+}
+
 Event best_effort_event(const std::string& dds_topic) {
   return {Severity::kWarning,
           0,
@@ -18,7 +22,7 @@ Event best_effort_event(const std::string& dds_topic) {
 std::optional<Event> malformed_event(const std::string& dds_topic,
                                      const std::string& writer_guid,
                                      std::uint64_t count) {
-  if (!std::has_single_bit(count)) {
+  if (!is_told(count)) {
     return std::nullopt;
   }
   return Event{

@@ -11,11 +11,15 @@
 
 namespace trigpoint::bus {
 
+/// Of what may come in streams the first, second, fourth, eighth, ... is told, so that the log is
+/// not flooded.
+bool is_told(std::uint64_t count);
+
 /// A reader was made anew as best effort.
 Event best_effort_event(const std::string& dds_topic);
 
-/// The `count`th sample that could not be decoded came from this writer. Told at the first, second,
-/// fourth, eighth, ... so that a stream of them does not flood the log.
+/// The `count`th sample that could not be decoded came from this writer; nothing when it is not
+/// told.
 std::optional<Event> malformed_event(const std::string& dds_topic,
                                      const std::string& writer_guid,
                                      std::uint64_t count);

@@ -2,7 +2,9 @@
 // Copyright the Trigpoint developers
 #include "cyclone_node.hpp"
 
+#include "../network.hpp"
 #include "../process_note.hpp"
+#include "../reader_events.hpp"
 #include "cyclone_reader.hpp"
 #include "cyclone_writer.hpp"
 #include "domain_config.hpp"
@@ -11,7 +13,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <bit>
 #include <stdexcept>
 #include <utility>
 
@@ -39,9 +40,7 @@ CycloneNode::CycloneNode(const Config& config, const std::string& name, EventSin
         [this](std::size_t size_bytes, dds_return_t why) { tell_not_sent(size_bytes, why); });
     tell(*warning);
   }
-  const std::string what =
-      "cannot join DDS domain " + std::to_string(domain_of(config)) +
-      " (are its UDP ports, from 7400 + 250 x domain, free, and is there a network interface?)";
+  const std::string what = cannot_join(domain_of(config));
   const dds_domainid_t id = next_private_id();
   domain_ = checked(dds_create_domain(id, domain_config(config, buffers).c_str()), what);
   const QosPointer qos(dds_create_qos());
@@ -92,11 +91,9 @@ void CycloneNode::tell(const Event& event) const {
   }
 }
 
-// At the first, second, fourth, eighth, ... so that a stream of them does not flood the log.
-
 void CycloneNode::tell_of_unknown_writer(const std::string& dds_topic) {
   const std::uint64_t count = ++of_unknown_writer_;
-  if (std::has_single_bit(count)) {
+  if (is_told(count)) {
     tell({Severity::kWarning,
           0,
           "bus_unknown_writer",
@@ -107,7 +104,7 @@ void CycloneNode::tell_of_unknown_writer(const std::string& dds_topic) {
 
 void CycloneNode::tell_not_sent(std::size_t size_bytes, dds_return_t why) {
   const std::uint64_t count = ++not_sent_;
-  if (std::has_single_bit(count)) {
+  if (is_told(count)) {
     tell({Severity::kWarning,
           0,
           "bus_sample_not_sent",

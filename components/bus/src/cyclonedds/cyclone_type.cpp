@@ -68,10 +68,9 @@ SerData* make_data(const ddsi_sertype* type, ddsi_serdata_kind kind, std::size_t
   return data.release();
 }
 
-// ---- what Cyclone calls: data
-// -------------------------------------------------------------------- None of these may throw into
-// C: `noexcept` turns the only possible case, no memory, into an end with a message, as Cyclone's
-// own allocator does.
+// ---- what Cyclone calls: data -------------------------------------------------------------------
+// None of these may throw into C: `noexcept` turns the only possible case, no memory, into an end
+// with a message, as Cyclone's own allocator does.
 
 bool have_equal_keys(const ddsi_serdata*, const ddsi_serdata*) noexcept {
   return true;  // no type here has a key
@@ -237,8 +236,7 @@ ddsi_serdata_ops make_data_ops() {
   return ops;
 }
 
-// ---- what Cyclone calls: type
-// --------------------------------------------------------------------
+// ---- what Cyclone calls: type -------------------------------------------------------------------
 
 void free_type(ddsi_sertype* type) noexcept {
   ddsi_sertype_fini(type);

@@ -2,6 +2,7 @@
 // Copyright the Trigpoint developers
 #include "fastdds_node.hpp"
 
+#include "../network.hpp"
 #include "../process_note.hpp"
 #include "endpoint.hpp"
 #include "fastdds_reader.hpp"
@@ -52,9 +53,7 @@ FastNode::FastNode(const Config& config, const std::string& name, EventSink sink
   participant_ = factory->create_participant(
       static_cast<dds::DomainId_t>(domain), qos, this, dds::StatusMask::none());
   if (participant_ == nullptr) {
-    throw std::runtime_error("cannot join DDS domain " + std::to_string(domain) +
-                             "; are its UDP ports (from 7400 + 250 x domain) free, and is there a "
-                             "network interface?");
+    throw std::runtime_error(cannot_join(domain));
   }
   publisher_ = participant_->create_publisher(dds::PUBLISHER_QOS_DEFAULT);
   subscriber_ = participant_->create_subscriber(dds::SUBSCRIBER_QOS_DEFAULT);
