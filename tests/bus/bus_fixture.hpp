@@ -5,16 +5,12 @@
 
 #include "trigpoint/bus/bus.hpp"
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <unistd.h>
+#include "run_command.hpp"
 
 #include <chrono>
 #include <condition_variable>
-#include <filesystem>
 #include <functional>
 #include <mutex>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -24,28 +20,16 @@ namespace trigpoint::bus::testing {
 // Far above anything a loaded machine needs; only a broken bus waits so long.
 inline constexpr std::chrono::seconds kForever{30};
 
-/// A domain that no other test on this computer has, as long as this process lives.
-inline int locked_domain() {
-  constexpr int kDomains = 100;  // 1 to 100; above 101 the ports are not ours
-  for (int attempt = 0; attempt < kDomains; ++attempt) {
-    const int domain = 1 + (getpid() + attempt) % kDomains;
-    const auto file = std::filesystem::temp_directory_path() /
-                      ("trigpoint-test-domain-" + std::to_string(domain) + ".lock");
-    const int lock = open(file.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666);
-    if (lock >= 0 && flock(lock, LOCK_EX | LOCK_NB) == 0) {
-      return domain;  // the lock ends with the process
-    }
-    close(lock);
-  }
-  throw std::runtime_error("all DDS domains are taken by other tests");
-}
-
-inline Config own_domain() {
-  static const int domain = locked_domain();
+inline Config config_of_domain(int id) {
   Config config;
-  config.domain_id = domain;
+  config.domain_id = id;
   config.network_interface = "lo";
   return config;
+}
+
+/// On a domain that no other test has.
+inline Config own_domain() {
+  return config_of_domain(tests::own_domain_id());
 }
 
 /// Collects what callbacks bring, from any thread.

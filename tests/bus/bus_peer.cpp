@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
-// The writing process of the vendor matrix, linked once with each vendor:
-//   matrix_writer DOMAIN TOPIC            its example, again and again until it is killed
-//   matrix_writer DOMAIN stream BYTES     IMU at 400 Hz beside clouds of so many bytes at 10 Hz
+// Another process on the bus for tests, linked once with each vendor:
+//   bus_peer DOMAIN TOPIC            its example, again and again until it is killed
+//   bus_peer DOMAIN hear TOPIC       hears it until it is killed, and is missed only long after
+//   bus_peer DOMAIN stream BYTES     IMU at 400 Hz beside clouds of so many bytes at 10 Hz
+#include "bus_fixture.hpp"
 #include "matrix_messages.hpp"
 #include <sys/prctl.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <cstdio>
@@ -34,8 +37,18 @@ int repeat(Participant& participant, const std::string& wanted) {
       }
     }
   });
-  std::fprintf(
-      stderr, "matrix_writer: %s %s\n", found ? "cannot publish" : "no topic", wanted.c_str());
+  std::fprintf(stderr, "bus_peer: %s %s\n", found ? "cannot publish" : "no topic", wanted.c_str());
+  return 1;
+}
+
+int hear(Participant& participant, const std::string& wanted) {
+  visit_topics([&]<class T>(const char* name, const Topic<T>& topic, const T&) {
+    if (wanted == name) {
+      Subscription<T> subscription(participant, topic, [](const T&, const MessageInfo&) {});
+      pause();
+    }
+  });
+  std::fprintf(stderr, "bus_peer: no topic %s\n", wanted.c_str());
   return 1;
 }
 
@@ -85,12 +98,20 @@ int main(int count, char** arguments) {
   using namespace trigpoint::bus;
   prctl(PR_SET_PDEATHSIG, SIGKILL);  // never outlives a test that fails
   if (count < 3) {
-    std::fprintf(stderr, "usage: matrix_writer DOMAIN TOPIC | matrix_writer DOMAIN stream BYTES\n");
+    std::fprintf(stderr,
+                 "usage: bus_peer DOMAIN TOPIC | DOMAIN hear TOPIC | DOMAIN stream BYTES\n");
     return 2;
   }
-  Participant participant(matrix::domain(std::atoi(arguments[1])), "matrix_writer");
   const std::string what = arguments[2];
-  return what == "stream" && count > 3
+  Config config = trigpoint::bus::testing::config_of_domain(std::atoi(arguments[1]));
+  if (what == "hear") {
+    config.lease_s = 60.0;  // stays matched also when it is stopped
+  }
+  Participant participant(config, "bus_peer");
+  if (count > 3 && what == "hear") {
+    return matrix::hear(participant, arguments[3]);
+  }
+  return count > 3 && what == "stream"
              ? matrix::stream(participant, std::strtoul(arguments[3], nullptr, 10))
              : matrix::repeat(participant, what);
 }

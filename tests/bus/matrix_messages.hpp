@@ -16,13 +16,6 @@
 
 namespace trigpoint::bus::matrix {
 
-inline Config domain(int id) {
-  Config config;
-  config.domain_id = id;
-  config.network_interface = "lo";
-  return config;
-}
-
 inline diagnostic_msgs::msg::DiagnosticArray diagnostics() {
   const Diagnostic one{DiagnosticLevel::kStale, "name", "message", "id", {{"key", "value"}}};
   return to_message(Nanoseconds{8}, std::vector{one, one});
@@ -62,10 +55,9 @@ void visit_topics(Visitor&& visit) {
   visit("diagnostics", topics::diagnostics, diagnostics());
 }
 
-// ---- streams
-// ------------------------------------------------------------------------------------- Number 0 is
-// repeated until the reader has heard it on both topics; then it subscribes to `kBegin`, and 1, 2,
-// ... follow once each.
+// ---- streams ------------------------------------------------------------------------------------
+// Number 0 is repeated until the reader has heard it on both topics; then it subscribes to
+// `kBegin`, and 1, 2, ... follow once each.
 
 inline constexpr auto kBegin = topics::diagnostics;
 inline constexpr std::uint32_t kClouds = 50;

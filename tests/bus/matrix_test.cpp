@@ -34,7 +34,7 @@ std::vector<std::string> topic_names() {
 }
 
 std::vector<std::string> writer_command(const std::string& vendor, std::vector<std::string> what) {
-  std::vector<std::string> command{std::string(TRIGPOINT_BIN_DIR) + "/matrix_writer_" + vendor,
+  std::vector<std::string> command{std::string(TRIGPOINT_BIN_DIR) + "/bus_peer_" + vendor,
                                    std::to_string(own_domain().domain_id)};
   std::move(what.begin(), what.end(), std::back_inserter(command));
   return command;
@@ -61,15 +61,14 @@ void expect_equal_message(const T& got, const T& sent) {
   EXPECT_EQ(bytes_of(backend::type_ops<T>(), &got), bytes_of(backend::type_ops<T>(), &sent));
 }
 
-// ---- every topic
-// ---------------------------------------------------------------------------------
+// ---- every topic --------------------------------------------------------------------------------
 
 /// Writing vendor and topic.
 class Topics : public ::testing::TestWithParam<std::tuple<std::string, std::string>> {};
 
 TEST_P(Topics, arrive_with_every_field) {
   const auto& [vendor, wanted] = GetParam();
-  Participant participant(domain(static_cast<int>(own_domain().domain_id)), "matrix_reader");
+  Participant participant(own_domain(), "matrix_reader");
   visit_topics([&, &topic_name = wanted, &writer_vendor = vendor]<class T>(
                    const char* name, const Topic<T>& topic, const T& sent) {
     if (topic_name != name) {
@@ -114,8 +113,7 @@ TEST(MatrixTopics, are_all_those_of_the_header) {
   EXPECT_EQ(in_header, std::set<std::string>(names.begin(), names.end()));
 }
 
-// ---- streams
-// -------------------------------------------------------------------------------------
+// ---- streams ------------------------------------------------------------------------------------
 
 template <class T>
 class Stream {
@@ -171,7 +169,7 @@ TEST_P(Streams, of_clouds_at_10_hz_and_imu_at_400_hz_arrive_whole_and_in_order) 
   const auto pattern = numbered_cloud(0, bytes).data;
   Stream<PointCloudMessage> clouds;
   Stream<ImuSample> samples;
-  Participant participant(domain(static_cast<int>(own_domain().domain_id)), "matrix_reader");
+  Participant participant(own_domain(), "matrix_reader");
   Subscription<sensor_msgs::msg::PointCloud2> points(
       participant, topics::points, [&](const auto& message, const MessageInfo& info) {
         const std::uint32_t number = message.height();

@@ -8,9 +8,6 @@
 #include "bus_fixture.hpp"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/prctl.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <csignal>
@@ -40,26 +37,18 @@ PointCloudMessage two_megabytes(std::uint32_t number) {
   return cloud;
 }
 
-// First: fork must come before the middleware has threads, also when all tests run in one process.
-/// A process that publishes on gps/fix until it is killed.
-pid_t start_publisher(const Config& config) {
-  const pid_t child = fork();
-  if (child == 0) {
-    prctl(PR_SET_PDEATHSIG, SIGKILL);  // never outlives a test that fails
-    Participant participant(config, "child");
-    Publisher publisher(participant, topics::fix);
-    while (true) {
-      publisher.publish(to_message(samples::fix()));
-      std::this_thread::sleep_for(20ms);
-    }
-  }
-  return child;
+/// Another process on our domain and backend: bus_peer.cpp says which there are.
+std::vector<std::string> peer_command(const Config& config, std::vector<std::string> what) {
+  what.insert(what.begin(),
+              {std::string(TRIGPOINT_BIN_DIR) + "/bus_peer_" + backend::name(),
+               std::to_string(config.domain_id)});
+  return what;
 }
 
 TEST(KilledProcess, is_noticed_within_its_lease) {
   constexpr auto kNoticeLimit = 3s;  // lease of 2 s and a busy machine
   const Config config = own_domain();
-  const pid_t child = start_publisher(config);  // before this process has threads
+  const tests::Command peer(peer_command(config, {"fix"}));
   Participant participant(config, "parent");
   Collected<std::string> lost;
   Collected<std::string> writers;
@@ -71,38 +60,24 @@ TEST(KilledProcess, is_noticed_within_its_lease) {
        [&](const std::string& guid) { lost.add(guid); },
        {}});
   ASSERT_TRUE(writers.wait_for(1));
-  kill(child, SIGKILL);
-  waitpid(child, nullptr, 0);
+  peer.signal(SIGKILL);
   const auto killed = std::chrono::steady_clock::now();
   ASSERT_TRUE(lost.wait_for(1));
   EXPECT_LE(std::chrono::steady_clock::now() - killed, kNoticeLimit);
   EXPECT_EQ(lost.items(), writers.items());
 }
 
-/// A process that hears points until it is killed.
-pid_t start_reader(const Config& config) {
-  const pid_t child = fork();
-  if (child == 0) {
-    prctl(PR_SET_PDEATHSIG, SIGKILL);
-    Participant participant(config, "child");
-    Subscription<sensor_msgs::msg::PointCloud2> subscription(
-        participant, topics::points, [](const auto&, const MessageInfo&) {});
-    pause();
-  }
-  return child;
-}
-
 TEST(StoppedReader, holds_no_writer_back) {
   constexpr int kClouds = 100;
   constexpr auto kLimit = 5s;  // held back for 0.1 s each they would take 10 s
   Config config = own_domain();
-  config.lease_s = 60.0;                     // the reader stays matched
-  const pid_t child = start_reader(config);  // before this process has threads
+  config.lease_s = 60.0;
+  const tests::Command peer(peer_command(config, {"hear", "points"}));
   Participant participant(config, "parent");
   Readers readers;
   Publisher publisher(participant, topics::points, readers.events());
   ASSERT_TRUE(readers.wait_for(1));
-  kill(child, SIGSTOP);
+  peer.signal(SIGSTOP);
   PointCloudMessage cloud = samples::cloud();
   cloud.data.resize(200'000);
   const auto begin = std::chrono::steady_clock::now();
@@ -111,8 +86,6 @@ TEST(StoppedReader, holds_no_writer_back) {
   }
   EXPECT_LE(std::chrono::steady_clock::now() - begin, kLimit);
   EXPECT_EQ(publisher.matched(), 1);
-  kill(child, SIGKILL);
-  waitpid(child, nullptr, 0);
 }
 
 TEST(SmallBuffers, are_told_with_their_size_and_the_remedy) {

@@ -3,6 +3,7 @@
 #include "run_command.hpp"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -151,8 +152,27 @@ void write_file(const std::string& file, const std::string& text) {
   stream << text;
 }
 
+int own_domain_id(int offset) {
+  constexpr int kDomains = 100;  // above 101 the ports are not ours
+  static std::map<int, int> taken;
+  if (const auto known = taken.find(offset); known != taken.end()) {
+    return known->second;
+  }
+  for (int attempt = 0; attempt < kDomains; ++attempt) {
+    const int domain = 1 + (static_cast<int>(getpid()) * 7 + offset + attempt) % kDomains;
+    const fs::path file =
+        fs::temp_directory_path() / ("trigpoint-test-domain-" + std::to_string(domain) + ".lock");
+    const int lock = open(file.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666);
+    if (lock >= 0 && flock(lock, LOCK_EX | LOCK_NB) == 0) {
+      return taken[offset] = domain;  // the lock ends with the process
+    }
+    close(lock);
+  }
+  throw std::runtime_error("all DDS domains are taken by other tests");
+}
+
 std::string own_domain(int offset) {
-  return std::to_string(1 + (static_cast<int>(getpid()) * 7 + offset) % 99);
+  return std::to_string(own_domain_id(offset));
 }
 
 }  // namespace trigpoint::tests

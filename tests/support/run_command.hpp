@@ -65,7 +65,9 @@ class TemporaryFolder {
 std::string read_file(const std::string& file);
 void write_file(const std::string& file, const std::string& text);
 
-/// A DDS domain that no other test that runs at the same time uses (1 to 99, from the process id).
+/// A DDS domain, 1 to 100, that no other test on this computer has as long as this process lives;
+/// always the same for an offset.
+int own_domain_id(int offset = 0);
 std::string own_domain(int offset = 0);
 
 }  // namespace trigpoint::tests
