@@ -188,7 +188,7 @@ def sound_tree():
         "components/lio_mapper/src/map.cpp": HEAD + "#include <pcl/io/pcd_io.h>\n#include \"trigpoint/base/pose.hpp\"\n",
         "components/fusion_gate/process/main.cpp": HEAD + "#include \"sensor_msgs.h\"\n#include \"trigpoint/bus/bus.hpp\"\n",
         "components/cli/src/record.cpp": HEAD + "#include \"trigpoint/bus/cdr.hpp\"\n",
-        "README.md": "docker: WORKDIR ${HOME}/work/src, https://example.org/" "root/x\n",
+        "README.md": f"docker: WORKDIR ${{HOME}}{SLASH}work/src, https://example.org{SLASH}root/x\n",
     }
 
 
