@@ -11,6 +11,8 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <string>
+#include <vector>
 
 namespace trigpoint::cli {
 
@@ -35,13 +37,17 @@ void require_session(const std::string& folder) {
                     "lio.tum, gps.tum is in it); trigpoint map and bringup/run leave one");
 }
 
+/// What was asked for by name and could not be written is a failure; what "all" cannot do is not.
 int run(const ExportVerbOptions& options) {
   require_session(options.session);
+  const std::string out = options.out.empty()
+                              ? (std::filesystem::path(options.session) / "export").string()
+                              : options.out;
   exporter::ExportReport report;
   {
     Progress progress("exporting");
     report = exporter::export_session(
-        options.session, options.out, options.what, [&](double share) { progress(share); });
+        options.session, out, options.what, [&](double share) { progress(share); });
   }
   for (const exporter::ExportedFile& file : report.written) {
     std::cout << file.file << "  " << file.content << "\n";
@@ -49,7 +55,25 @@ int run(const ExportVerbOptions& options) {
   for (const std::string& sentence : report.missing) {
     std::cerr << sentence << "\n";
   }
-  return 0;
+  return options.what.formats.empty() || report.formats_missing.empty() ? 0 : 1;
+}
+
+std::vector<std::string> names_of_formats() {
+  std::vector<std::string> names;
+  for (const exporter::ExportFormat& format : exporter::export_formats()) {
+    names.push_back(format.name);
+  }
+  return names;
+}
+
+std::string help_of_formats() {
+  std::string text = "Formats:\n";
+  for (const exporter::ExportFormat& format : exporter::export_formats()) {
+    text += "  " + format.name + std::string(9 - format.name.size(), ' ') + format.content + "\n";
+  }
+  return text +
+         "LAS, GeoJSON, GPX, KML, KMZ and GeoTIFF need the session's datum.yaml. Heights are above "
+         "the WGS 84 ellipsoid.";
 }
 
 }  // namespace
@@ -61,12 +85,26 @@ void add_export(CLI::App& app, Chosen& chosen) {
   verb->add_option("SESSION", options->session, "session folder")
       ->required()
       ->check(CLI::ExistingDirectory);
-  verb->add_option("--out", options->out, "folder, created when missing")->required();
-  verb->add_option("--format", options->what.formats, "pcd, tum; may be repeated (default both)")
-      ->check(CLI::IsMember({"pcd", "tum"}));
+  verb->add_option(
+      "--out",
+      options->out,
+      "folder, created when missing (default SESSION/export); what it holds already is "
+      "never written over");
+  verb->add_option("--format", options->what.formats, "see below; may be repeated (default all)")
+      ->check(CLI::IsMember(names_of_formats()));
   verb->add_option("--voxel", options->what.voxel_m, "cell size of the point cloud, m")
       ->capture_default_str()
       ->check(more_than_zero());
+  verb->add_option("--tile",
+                   options->what.tile_m,
+                   "split the point clouds into squares of this edge, m (default: whole)")
+      ->check(more_than_zero());
+  verb->add_option("--cell",
+                   options->what.cell_m,
+                   "cell size of top view and height, m; larger on a map of over 16 million cells")
+      ->capture_default_str()
+      ->check(more_than_zero());
+  verb->footer(help_of_formats());
   verb->callback([options, &chosen] { chosen = [options] { return run(*options); }; });
 }
 

@@ -3,11 +3,7 @@
 // Format: https://pointclouds.org/documentation/tutorials/pcd_file_format.html
 #include "pcd_writer.hpp"
 
-#include "line_file.hpp"
-
 #include <bit>
-#include <cerrno>
-#include <cstdio>
 #include <iomanip>
 #include <sstream>
 
@@ -24,21 +20,7 @@ constexpr int kCountWidth = 12;
 }  // namespace
 
 PcdWriter::PcdWriter(const std::string& file, const std::string& frame)
-    : file_(file),
-      part_(file + ".part"),
-      frame_(frame),
-      out_(part_, std::ios::binary | std::ios::trunc) {
-  check("open for writing");
-  out_ << header();
-  check("write");
-}
-
-PcdWriter::~PcdWriter() {
-  if (!finished_) {
-    out_.close();
-    std::remove(part_.c_str());
-  }
-}
+    : frame_(frame), file_(file, header()) {}
 
 std::string PcdWriter::header() const {
   std::ostringstream text;
@@ -52,30 +34,13 @@ std::string PcdWriter::header() const {
   return text.str();
 }
 
-void PcdWriter::check(const std::string& what) {
-  if (!out_) {
-    throw_errno(file_, what);
-  }
-}
-
 void PcdWriter::append(const PointCloud& points) {
-  errno = 0;
-  out_.write(reinterpret_cast<const char*>(points.data()),
-             static_cast<std::streamsize>(points.size() * sizeof(PointXyzi)));
-  check("write");
+  file_.append(reinterpret_cast<const char*>(points.data()), points.size() * sizeof(PointXyzi));
   points_ += points.size();
 }
 
 std::uint64_t PcdWriter::finish() {
-  errno = 0;
-  out_.seekp(0);
-  out_ << header();
-  out_.close();
-  check("write");
-  if (std::rename(part_.c_str(), file_.c_str()) != 0) {
-    throw_errno(file_, "replace");
-  }
-  finished_ = true;
+  file_.finish(header());
   return points_;
 }
 

@@ -4,21 +4,19 @@
 
 #include "trigpoint/base/measurements.hpp"
 
+#include "part_file.hpp"
+
 #include <cstdint>
-#include <fstream>
 #include <string>
 
 namespace trigpoint::exporter {
 
 /// Binary PCD 0.7 with x y z intensity, written as it comes, since PCL's own writer wants the whole
-/// cloud in memory. The file gets its name in finish(): one that is there is whole.
+/// cloud in memory.
 class PcdWriter {
  public:
   /// `frame` is told in a comment of the header; empty: nothing is told.
   explicit PcdWriter(const std::string& file, const std::string& frame = "");
-  ~PcdWriter();
-  PcdWriter(const PcdWriter&) = delete;
-  PcdWriter& operator=(const PcdWriter&) = delete;
 
   void append(const PointCloud& points);
   /// Returns the number of points written.
@@ -26,14 +24,10 @@ class PcdWriter {
 
  private:
   std::string header() const;
-  void check(const std::string& what);
 
-  std::string file_;
-  std::string part_;
   std::string frame_;
-  std::ofstream out_;
   std::uint64_t points_{0};
-  bool finished_{false};
+  PartFile file_;
 };
 
 }  // namespace trigpoint::exporter

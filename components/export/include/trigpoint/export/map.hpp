@@ -59,6 +59,11 @@ void write_pcd(const std::string& file, const PointCloud& cloud);
 /// such file.
 std::string frame_of_pcd(const std::string& file);
 
+/// Hands a file's points over in parts, with the share read so far: memory does not grow with the
+/// file when that is binary, as maps are. Points with a coordinate that is not finite are left out.
+void visit_pcd(const std::string& file,
+               const std::function<void(const PointCloud& points, double share)>& visit);
+
 /// Reads x y z and, when there, intensity.
 PointCloud read_pcd(const std::string& file);
 
