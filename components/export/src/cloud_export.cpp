@@ -61,7 +61,7 @@ class CloudOutputs {
       if (output.tiles != nullptr) {
         content += ", in " + std::to_string(output.tiles->tiles()) + " tiles";
       }
-      written.push_back({output.path, content});
+      written.push_back({output.path, content, output.format});
     }
     return written;
   }
@@ -70,6 +70,7 @@ class CloudOutputs {
   using OpenFile = std::function<std::unique_ptr<CloudFile>(const std::string& file)>;
 
   struct Output {
+    std::string format;
     std::string path;
     bool in_utm{false};
     std::unique_ptr<CloudFile> cloud;
@@ -83,6 +84,7 @@ class CloudOutputs {
       return;
     }
     Output output;
+    output.format = format;
     output.in_utm = in_utm;
     if (job_.tile_m > 0.0) {
       output.path = path_in(job_.out_folder, "map_" + format);
@@ -160,10 +162,10 @@ void write_tiffs(const CloudExport& job, const TopView& view, std::vector<Export
                               " m, EPSG:" + std::to_string(epsg_of(job.earth->zone()));
   const std::string picture = path_in(job.out_folder, "top_view.tif");
   write_picture_tiff(picture, view, wkt);
-  written.push_back({picture, content});
+  written.push_back({picture, content, "geotiff"});
   const std::string height = path_in(job.out_folder, "height.tif");
   write_height_tiff(height, view, wkt);
-  written.push_back({height, content + ", highest point above the ellipsoid"});
+  written.push_back({height, content + ", highest point above the ellipsoid", "geotiff"});
 }
 
 /// Throws when a point of the map has no place in UTM although the datum has.

@@ -46,8 +46,8 @@ struct Work {
 
   std::string in_out(const std::string& name) const { return path_in(out, name); }
 
-  void written(const std::string& file, const std::string& content) {
-    report.written.push_back({file, content});
+  void written(const std::string& file, const std::string& content, const std::string& format) {
+    report.written.push_back({file, content, format});
   }
 };
 
@@ -191,7 +191,8 @@ std::string provide_points(Work& work, const std::string& hidden) {
     if (whole_pcd) {
       work.written(target,
                    "frame " + work.report.map.frame + ", " +
-                       std::to_string(work.report.map.points_written) + " points");
+                       std::to_string(work.report.map.points_written) + " points",
+                   "pcd");
     }
     return rendered;
   }
@@ -200,7 +201,8 @@ std::string provide_points(Work& work, const std::string& hidden) {
     const std::string frame = frame_of_pcd(target);
     work.written(
         target,
-        (frame.empty() ? "" : "frame " + frame + ", ") + "copied: the session holds no keyframes");
+        (frame.empty() ? "" : "frame " + frame + ", ") + "copied: the session holds no keyframes",
+        "pcd");
   }
   return finished;
 }
@@ -247,17 +249,17 @@ void export_texts(Work& work) {
     const std::string target = work.in_out(trajectory.name);
     if (work.wants("tum")) {
       copy_file(path_in(work.session, trajectory.name + ".tum"), target + ".tum");
-      work.written(target + ".tum", poses);
+      work.written(target + ".tum", poses, "tum");
     }
     if (work.wants("kitti")) {
       write_kitti(target + ".kitti.txt", target + ".kitti_times.txt", trajectory.poses);
-      work.written(target + ".kitti.txt", poses + "; stamps in .kitti_times.txt");
+      work.written(target + ".kitti.txt", poses + "; stamps in .kitti_times.txt", "kitti");
     }
     if (work.wants("csv")) {
       write_trajectory_csv(target + ".csv",
                            trajectory.poses,
                            trajectory.is_in_map && work.earth ? &*work.earth : nullptr);
-      work.written(target + ".csv", poses);
+      work.written(target + ".csv", poses, "csv");
     }
   }
 }
@@ -277,11 +279,11 @@ void export_kml(Work& work, const std::vector<Track>& tracks, const std::optiona
   }
   if (work.wants("kml")) {
     write_kml(work.in_out("session.kml"), tracks, view ? kPicture : "", grid);
-    work.written(work.in_out("session.kml"), content);
+    work.written(work.in_out("session.kml"), content, "kml");
   }
   if (work.wants("kmz")) {
     write_kmz(work.in_out("session.kmz"), tracks, view ? png : "", grid);
-    work.written(work.in_out("session.kmz"), content);
+    work.written(work.in_out("session.kmz"), content, "kmz");
   }
 }
 
@@ -293,7 +295,7 @@ void export_tracks(Work& work, const std::optional<TopView>& view) {
   const std::string count = std::to_string(tracks.size()) + " trajectories";
   if (work.wants("geojson") && !tracks.empty()) {
     write_geojson(work.in_out("trajectories.geojson"), tracks);
-    work.written(work.in_out("trajectories.geojson"), count);
+    work.written(work.in_out("trajectories.geojson"), count, "geojson");
   }
   std::vector<Track> thin;
   for (const Track& track : tracks) {
@@ -301,21 +303,28 @@ void export_tracks(Work& work, const std::optional<TopView>& view) {
   }
   if (work.wants("gpx") && !tracks.empty()) {
     write_gpx(work.in_out("trajectories.gpx"), thin);
-    work.written(work.in_out("trajectories.gpx"), count + ", at most 10 poses a second");
+    work.written(work.in_out("trajectories.gpx"), count + ", at most 10 poses a second", "gpx");
   }
   export_kml(work, thin, view);
 }
 
-/// Formats that nothing was written in, and why the datum is to blame.
 void say_what_is_missing(Work& work) {
+  const auto& written = work.report.written;
   std::string without_datum;
   for (const ExportFormat& format : export_formats()) {
-    if (work.wants(format.name) && format.needs_datum && !work.earth) {
+    const bool is_written = std::any_of(written.begin(), written.end(), [&](const auto& file) {
+      return file.format == format.name;
+    });
+    if (!work.wants(format.name) || is_written) {
+      continue;
+    }
+    work.report.formats_missing.push_back(format.name);
+    if (format.needs_datum && !work.earth) {
       without_datum += (without_datum.empty() ? "" : ", ") + format.name;
-      work.report.formats_missing.push_back(format.name);
     }
   }
-  if (!without_datum.empty()) {
+  const bool has_datum = fs::exists(path_in(work.session, session_file::kDatum));
+  if (!without_datum.empty() && !has_datum) {
     work.report.missing.push_back(
         "no datum.yaml in the session (no fix was good enough to place the map): " + without_datum +
         " need a place on the Earth and are left out; pcd, ply, tum, kitti and csv do not");
@@ -373,7 +382,7 @@ ExportReport export_session(const std::string& session_folder,
   const auto datum = path_in(session_folder, session_file::kDatum);
   if (fs::exists(datum)) {
     copy_file(datum, work.in_out(session_file::kDatum));
-    work.written(work.in_out(session_file::kDatum), "origin of map");
+    work.written(work.in_out(session_file::kDatum), "origin of map", "");
   }
   work.progress(1.0);
   return work.report;

@@ -80,9 +80,9 @@ TEST_F(ExportSession, writes_only_the_formats_that_were_asked_for) {
 TEST_F(ExportSession, refuses_an_unknown_format_and_names_those_that_are) {
   write_lio();
   EXPECT_THAT(error_of([&] {
-                export_session(session(), out(), {{"las"}, 0.1});
+                export_session(session(), out(), {{"laz"}, 0.1});
               }),
-              AllOf(HasSubstr("'las'"), HasSubstr("pcd, tum")));
+              AllOf(HasSubstr("'laz'"), HasSubstr("pcd, ply, las")));
 }
 
 TEST_F(ExportSession, refuses_a_damaged_trajectory_with_file_and_line) {
@@ -111,17 +111,85 @@ TEST_F(ExportSession, takes_truth_alone_for_no_result) {
 
 TEST_F(ExportSession, and_the_map_file_itself_agree_on_the_frame) {
   write_keyframe();
-  EXPECT_THAT(export_session(session(), out(), {{"pcd"}, 0.1}).written[0].content,
+  EXPECT_THAT(export_session(session(), out("a"), {{"pcd"}, 0.1}).written[0].content,
               HasSubstr("frame odom"));
-  EXPECT_EQ(frame_of_pcd(out("map.pcd")), "odom");
+  EXPECT_EQ(frame_of_pcd(out("a/map.pcd")), "odom");
   write_alignment(path_in(session(), session_file::kAlignment), {});
-  export_session(session(), out(), {{"pcd"}, 0.1});
-  EXPECT_EQ(frame_of_pcd(out("map.pcd")), "map");
-  ASSERT_EQ(read_pcd(out("map.pcd")).size(), 1U);  // the comment is no hindrance to readers
-  std::filesystem::copy(out("map.pcd"), path_in(session(), session_file::kMap));
+  export_session(session(), out("b"), {{"pcd"}, 0.1});
+  EXPECT_EQ(frame_of_pcd(out("b/map.pcd")), "map");
+  ASSERT_EQ(read_pcd(out("b/map.pcd")).size(), 1U);  // the comment is no hindrance to readers
+  std::filesystem::copy(out("b/map.pcd"), path_in(session(), session_file::kMap));
   std::filesystem::remove(path_in(session(), session_file::kKeyframes));
-  EXPECT_THAT(export_session(session(), out(), {{"pcd"}, 0.1}).written[0].content,
+  EXPECT_THAT(export_session(session(), out("c"), {{"pcd"}, 0.1}).written[0].content,
               HasSubstr("frame map, copied"));
+}
+
+TEST_F(ExportSession, writes_over_nothing_and_names_what_is_there) {
+  write_lio();
+  create_session_folder(out());
+  write_all(out("lio.csv"), "mine");
+  EXPECT_THAT(error_of([&] { export_session(session(), out()); }),
+              AllOf(HasSubstr("holds lio.csv already"), HasSubstr("another folder")));
+  EXPECT_EQ(read_all(out("lio.csv")), "mine");
+  EXPECT_FALSE(std::filesystem::exists(out("lio.tum")));
+  EXPECT_FALSE(export_session(session(), out(), {{"tum"}}).written.empty());
+}
+
+TEST_F(ExportSession, without_a_datum_says_what_needs_one_and_writes_the_rest) {
+  write_lio();
+  write_keyframe();
+  const auto report = export_session(session(), out());
+  EXPECT_THAT(report.formats_missing,
+              testing::ElementsAre("las", "geojson", "gpx", "kml", "kmz", "geotiff"));
+  EXPECT_THAT(report.missing, Contains(AllOf(HasSubstr("no datum.yaml"), HasSubstr("pcd, ply"))));
+  EXPECT_THAT(read_all(out("map.ply")), HasSubstr("comment frame odom"));
+  EXPECT_TRUE(std::filesystem::exists(out("lio.kitti.txt")));
+  EXPECT_FALSE(std::filesystem::exists(out("map.las")));
+  EXPECT_THAT(error_of([&] { export_session(session(), out("las"), {{"las"}}); }),
+              AllOf(HasSubstr("nothing to export"), HasSubstr("datum.yaml")));
+}
+
+TEST_F(ExportSession, does_not_place_a_map_in_odom_on_the_earth) {
+  write_keyframe();
+  write_datum(path_in(session(), session_file::kDatum), {43.9, -78.9, 100.0});
+  const auto report = export_session(session(), out());
+  EXPECT_THAT(report.missing, Contains(HasSubstr("the map is in the frame odom")));
+  EXPECT_THAT(read_all(out("map.ply")), HasSubstr("comment frame odom"));
+  EXPECT_FALSE(std::filesystem::exists(out("map.las")));
+  EXPECT_FALSE(std::filesystem::exists(out("height.tif")));
+  EXPECT_THAT(report.formats_missing, Contains("las"));
+}
+
+TEST_F(ExportSession, leaves_no_hidden_file_and_writes_tiles_of_the_same_points) {
+  write_keyframe();
+  write_alignment(path_in(session(), session_file::kAlignment), {});
+  write_datum(path_in(session(), session_file::kDatum), {43.9, -78.9, 100.0});
+  export_session(session(), out(), {{"pcd", "las", "kmz"}, 0.1, 20.0});
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(out())) {
+    names.push_back(entry.path().filename());
+  }
+  EXPECT_THAT(names,
+              testing::UnorderedElementsAre("datum.yaml", "map_pcd", "map_las", "session.kmz"));
+  EXPECT_EQ(read_pcd(out("map_pcd/map_0_0.pcd")).size(), 1U);
+}
+
+TEST_F(ExportSession, places_lio_once_so_that_its_drift_shows) {
+  // lio sees 2 m where fused, which starts at (10, 0), sees 1 m.
+  TrajectoryWriter fused(path_in(session(), session_file::kFused), "base_link in map");
+  TrajectoryWriter lio(path_in(session(), session_file::kLio), "base_link in odom");
+  for (int i = 0; i < 3; ++i) {
+    fused.append(i * 1'000'000'000, Pose(Eigen::Quaterniond::Identity(), {10.0 + i, 0.0, 0.0}));
+    lio.append(i * 1'000'000'000, Pose(Eigen::Quaterniond::Identity(), {2.0 * i, 0.0, 0.0}));
+  }
+  // At the equator on Greenwich's other side, 1 m east is 8.983e-6 degrees.
+  write_datum(path_in(session(), session_file::kDatum), {1e-6, 3.0, 0.0});
+  export_session(session(), out(), {{"geojson"}});
+  const std::string text = read_all(out("trajectories.geojson"));
+  const std::string lio_line = text.substr(text.find("\"lio\""));
+  EXPECT_THAT(lio_line, HasSubstr("placed once"));
+  EXPECT_THAT(lio_line, HasSubstr("[ 3.000089832, 0.000001"));  // 10 m
+  EXPECT_THAT(lio_line, HasSubstr("[ 3.000125764, 0.000001"));  // 14 m
 }
 
 }  // namespace

@@ -87,16 +87,17 @@ class Landmark : public testing::TestWithParam<Place> {
  protected:
   Landmark() {
     GDALAllRegister();
+    CPLSetConfigOption("GPX_ELE_AS_25D", "YES");
     const Datum& datum = GetParam().datum;
     constexpr int kGeographic3d = 4979;
     constexpr int kGeocentric = 4978;
-    lon_lat_h_ =
-        transformed(kGeocentric, kGeographic3d, geocentric_of(datum, kLandmark_map_m));
+    lon_lat_h_ = transformed(kGeocentric, kGeographic3d, geocentric_of(datum, kLandmark_map_m));
     utm_ = transformed(kGeographic3d, GetParam().utm_epsg, lon_lat_h_);
     utm_.z() = lon_lat_h_.z();
     write_session();
     ExportOptions options;
-    options.formats = {"pcd", "ply", "las", "kitti", "csv", "geojson", "gpx", "kml", "kmz", "geotiff"};
+    options.formats = {
+        "pcd", "ply", "las", "kitti", "csv", "geojson", "gpx", "kml", "kmz", "geotiff"};
     export_session(folder_.file("session"), folder_.file("out"), options);
   }
 
@@ -131,8 +132,7 @@ class Landmark : public testing::TestWithParam<Place> {
 
   /// The last vertex of the only line of a vector file.
   Eigen::Vector3d last_vertex(const std::string& file, const char* layer_name) const {
-    const std::unique_ptr<GDALDataset> dataset(
-        GDALDataset::Open(file.c_str(), GDAL_OF_VECTOR));
+    const std::unique_ptr<GDALDataset> dataset(GDALDataset::Open(file.c_str(), GDAL_OF_VECTOR));
     EXPECT_TRUE(dataset) << file;
     OGRLayer* layer =
         layer_name == nullptr ? dataset->GetLayer(0) : dataset->GetLayerByName(layer_name);
@@ -206,7 +206,8 @@ TEST_P(Landmark, is_in_the_las_in_utm) {
   }
   EXPECT_EQ(integer_at<std::uint16_t>(las, data + 12), 100 * 257) << "of 255";
   OGRSpatialReference reference;
-  ASSERT_EQ(reference.importFromWkt(las.substr(375 + 54, data - 375 - 54 - 1).c_str()), OGRERR_NONE);
+  ASSERT_EQ(reference.importFromWkt(las.substr(375 + 54, data - 375 - 54 - 1).c_str()),
+            OGRERR_NONE);
   OGRSpatialReference flat;
   flat.importFromEPSG(GetParam().utm_epsg);
   EXPECT_EQ(reference.GetAxesCount(), 3) << "heights are told too";
@@ -249,8 +250,7 @@ TEST_P(Landmark, is_in_geojson_gpx_kml_and_kmz) {
 
 TEST_P(Landmark, is_the_only_cell_of_the_geotiffs) {
   for (const char* name : {"height.tif", "top_view.tif"}) {
-    const std::unique_ptr<GDALDataset> tiff(
-        GDALDataset::Open(out(name).c_str(), GDAL_OF_RASTER));
+    const std::unique_ptr<GDALDataset> tiff(GDALDataset::Open(out(name).c_str(), GDAL_OF_RASTER));
     ASSERT_TRUE(tiff) << name;
     EXPECT_STREQ(tiff->GetSpatialRef()->GetAuthorityCode(nullptr),
                  std::to_string(GetParam().utm_epsg).c_str());
@@ -301,7 +301,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Place{"south", {-33.8568, 151.2153, 20.0}, 32756},
                     Place{"south_of_the_equator_from_north_of_it", {0.003, 8.999, 5.0}, 32632},
                     Place{"over_the_edge_of_the_zone", {48.1, 5.995, 300.0}, 32631}),
-    [](const auto& info) { return std::string(info.param.name); });
+    [](const auto& place) { return std::string(place.param.name); });
 
 }  // namespace
 }  // namespace trigpoint::exporter

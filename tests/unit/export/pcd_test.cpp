@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <limits>
 
 namespace trigpoint::exporter {
 namespace {
@@ -39,6 +40,38 @@ TEST(Pcd, of_a_cloud_without_intensity_reads_zero) {
   ASSERT_EQ(read.size(), 1U);
   EXPECT_EQ(read[0].position(), Eigen::Vector3f(1.0F, 2.0F, 3.0F));
   EXPECT_EQ(read[0].intensity, 0.0F);
+}
+
+TEST(Pcd, is_visited_in_parts_as_it_is_read_whole) {
+  const ScratchFolder folder;
+  PointCloud cloud(200'000);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    cloud[i] = {static_cast<float>(i), 1.0F, 2.0F, 3.0F};
+  }
+  cloud[7].x = std::numeric_limits<float>::quiet_NaN();  // is left out
+  write_pcd(folder.file("a.pcd"), cloud);
+  PointCloud visited;
+  int parts = 0;
+  double last_share = 0.0;
+  visit_pcd(folder.file("a.pcd"), [&](const PointCloud& points, double share) {
+    visited.insert(visited.end(), points.begin(), points.end());
+    ++parts;
+    last_share = share;
+  });
+  ASSERT_EQ(visited.size(), cloud.size() - 1);
+  EXPECT_EQ(visited[7].x, 8.0F);
+  EXPECT_EQ(visited.back().x, 199'999.0F);
+  EXPECT_GT(parts, 2);
+  EXPECT_EQ(last_share, 1.0);
+}
+
+TEST(Pcd, that_ends_too_early_is_an_error_with_the_numbers) {
+  const ScratchFolder folder;
+  write_pcd(folder.file("a.pcd"), PointCloud(10));
+  std::filesystem::resize_file(folder.file("a.pcd"),
+                               std::filesystem::file_size(folder.file("a.pcd")) - 1);
+  EXPECT_THAT(error_of([&] { visit_pcd(folder.file("a.pcd"), [](const auto&, double) {}); }),
+              testing::AllOf(HasSubstr("a.pcd"), HasSubstr("10 points")));
 }
 
 TEST(Pcd, errors_name_the_file) {

@@ -32,6 +32,7 @@ const std::vector<ExportFormat>& export_formats();
 struct ExportedFile {
   std::string file;
   std::string content;  ///< e.g. "1234 poses" or "map, 500000 points"
+  std::string format;   ///< empty of what comes along: datum.yaml
 };
 
 struct ExportReport {
