@@ -335,9 +335,28 @@ TEST(Command, export_refuses_what_is_no_session_and_a_format_there_is_not) {
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.output, HasSubstr("no session"));
   EXPECT_EQ(
-      trigpoint({"export", folder.path("drive"), "--out", folder.path("e"), "--format", "ply"})
+      trigpoint({"export", folder.path("drive"), "--out", folder.path("e"), "--format", "laz"})
           .exit_code,
       2);
+}
+
+TEST(Command, export_writes_what_it_can_and_fails_for_what_was_asked_for_and_cannot_be) {
+  const TemporaryFolder folder;
+  const std::string session = folder.path("session");
+  fs::create_directory(session);
+  tests::write_file(session + "/fused.tum", "1.0 0 0 0 0 0 0 1\n2.0 5 0 0 0 0 0 1\n");
+  const CommandResult las = trigpoint({"export", session, "--format", "las", "--format", "csv"});
+  EXPECT_EQ(las.exit_code, 1);
+  EXPECT_THAT(las.output, AllOf(HasSubstr("no datum.yaml"), HasSubstr("fused.csv  2 poses, map")));
+  tests::write_file(session + "/datum.yaml",
+                    "latitude_deg: 43.9\nlongitude_deg: -78.9\nheight_m: 100\nelected_ns: 0\n");
+  const CommandResult again = trigpoint({"export", session});
+  EXPECT_EQ(again.exit_code, 1);
+  EXPECT_THAT(again.output, HasSubstr("fused.csv already"));
+  const CommandResult all = trigpoint({"export", session, "--out", folder.path("all")});
+  EXPECT_EQ(all.exit_code, 0) << all.output;
+  EXPECT_THAT(all.output, AllOf(HasSubstr("session.kmz"), HasSubstr("no map"), HasSubstr("100 %")));
+  EXPECT_THAT(trigpoint({"export", "--help"}).output, HasSubstr("LAS 1.4"));
 }
 
 TEST(Command, a_play_to_nobody_fails_unless_that_is_allowed) {
