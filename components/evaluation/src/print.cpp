@@ -15,7 +15,9 @@ void add_row(Table& table, const std::string& name, const Statistics& s, int dec
              fixed(s.rmse, decimals),
              fixed(s.mean, decimals),
              fixed(s.median, decimals),
-             fixed(s.max, decimals)});
+             fixed(s.max, decimals),
+             fixed(s.min, decimals),
+             fixed(s.standard_deviation, decimals)});
 }
 
 std::string print(const Score& score, ReferenceKind kind) {
@@ -24,7 +26,7 @@ std::string print(const Score& score, ReferenceKind kind) {
     return text + ": not determined by these positions (too few, or in one place or on one line)\n";
   }
   text += "\n\n";
-  Table table({"error", "rmse", "mean", "median", "max"});
+  Table table({"error", "rmse", "mean", "median", "max", "min", "std"});
   add_row(table, "position [m]", score.error.position_m, 3);
   add_row(table, "horizontal [m]", score.error.horizontal_m, 3);
   add_row(table, "x (east) [m]", score.error.axes_m[0], 3);

@@ -153,7 +153,7 @@ std::vector<PosePair> place_estimates(const Pose& T_reference_estimate,
 
 Statistics statistics_of(std::vector<double> values) {
   if (values.empty()) {
-    return {0, kNaN, kNaN, kNaN, kNaN};
+    return {0, kNaN, kNaN, kNaN, kNaN, kNaN, kNaN};
   }
   double sum = 0.0;
   double sum_of_squares = 0.0;
@@ -165,11 +165,18 @@ Statistics statistics_of(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   const std::size_t n = values.size();
   const auto count = static_cast<double>(n);
+  const double mean = sum / count;
+  double sum_about_mean = 0.0;
+  for (const double value : values) {
+    sum_about_mean += (value - mean) * (value - mean);
+  }
   return {n,
           std::sqrt(sum_of_squares / count),
-          sum / count,
+          mean,
           0.5 * (values[(n - 1) / 2] + values[n / 2]),
-          values.back()};
+          values.back(),
+          values.front(),
+          std::sqrt(sum_about_mean / count)};
 }
 
 AbsoluteError absolute_error(const std::vector<PosePair>& pairs) {

@@ -168,14 +168,21 @@ void write_tiffs(const CloudExport& job, const TopView& view, std::vector<Export
   written.push_back({height, content + ", highest point above the ellipsoid", "geotiff"});
 }
 
+/// A point of the map on the Earth.
+struct Place {
+  geodesy::Geographic geographic;
+  Eigen::Vector3d utm_m;
+};
+
 /// Throws when a point of the map has no place in UTM although the datum has.
-Eigen::Vector3d utm_of(const geodesy::MapOnEarth& earth, const Eigen::Vector3d& p_map_m) {
-  const auto utm_m = earth.utm(p_map_m);
+Place place_of(const geodesy::MapOnEarth& earth, const Eigen::Vector3d& p_map_m) {
+  const geodesy::Geographic geographic = earth.geographic(p_map_m);
+  const auto utm_m = earth.utm(geographic);
   if (!utm_m) {
     throw std::runtime_error("a point of the map, " + std::to_string(p_map_m.norm() / 1000.0) +
                              " km from the datum, has no place in the datum's UTM zone");
   }
-  return *utm_m;
+  return {geographic, *utm_m};
 }
 
 }  // namespace
@@ -199,9 +206,9 @@ CloudSurvey survey(const CloudExport& job, const std::function<void(double)>& pr
       if (job.earth == nullptr) {
         continue;
       }
-      const Eigen::Vector3d p_map_m = point.position().cast<double>();
-      const Eigen::Vector3d utm_m = utm_of(*job.earth, p_map_m);
-      const Eigen::Vector2d place_deg = lon_lat(job.earth->geographic(p_map_m));
+      const Place place = place_of(*job.earth, point.position().cast<double>());
+      const Eigen::Vector3d& utm_m = place.utm_m;
+      const Eigen::Vector2d place_deg = lon_lat(place.geographic);
       result.lowest_utm_m = result.lowest_utm_m.cwiseMin(utm_m);
       result.highest_utm_m = result.highest_utm_m.cwiseMax(utm_m);
       result.lowest_deg = result.lowest_deg.cwiseMin(place_deg);
@@ -217,7 +224,7 @@ CloudExportResult export_cloud(const CloudExport& job,
   const CloudSurvey surveyed = survey(job, [&](double share) { progress(0.4 * share); });
   CloudOutputs outputs(job, surveyed);
   Views views = views_of(job, surveyed);
-  const bool wants_utm = outputs.wants_utm() || views.utm;
+  const bool wants_earth = outputs.wants_utm() || views.utm || views.degrees;
   std::vector<FilePoint> in_frame;
   std::vector<FilePoint> in_utm;
   visit_pcd(job.pcd_file, [&](const PointCloud& points, double share) {
@@ -225,16 +232,16 @@ CloudExportResult export_cloud(const CloudExport& job,
     in_utm.clear();
     for (const PointXyzi& point : points) {
       in_frame.push_back({point.position().cast<double>(), point.intensity});
-      const Eigen::Vector3d& p_map_m = in_frame.back().position_m;
-      if (wants_utm) {
-        in_utm.push_back({utm_of(*job.earth, p_map_m), point.intensity});
+      if (!wants_earth) {
+        continue;
       }
+      const Place place = place_of(*job.earth, in_frame.back().position_m);
+      in_utm.push_back({place.utm_m, point.intensity});
       if (views.utm) {
-        views.utm->add(in_utm.back().position_m.head<2>(), in_utm.back().position_m.z());
+        views.utm->add(place.utm_m.head<2>(), place.utm_m.z());
       }
       if (views.degrees) {
-        const geodesy::Geographic place = job.earth->geographic(p_map_m);
-        views.degrees->add(lon_lat(place), place.height_m);
+        views.degrees->add(lon_lat(place.geographic), place.geographic.height_m);
       }
     }
     outputs.append(in_frame, in_utm);

@@ -26,7 +26,11 @@ Geographic MapOnEarth::geographic(const Eigen::Vector3d& position_map_m) const {
 }
 
 std::optional<Eigen::Vector3d> MapOnEarth::utm(const Eigen::Vector3d& position_map_m) const {
-  const auto utm = to_utm(geographic(position_map_m), zone_);
+  return utm(geographic(position_map_m));
+}
+
+std::optional<Eigen::Vector3d> MapOnEarth::utm(const Geographic& place) const {
+  const auto utm = to_utm(place, zone_);
   if (!utm) {
     return std::nullopt;
   }

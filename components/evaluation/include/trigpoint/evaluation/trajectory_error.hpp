@@ -70,13 +70,15 @@ std::optional<Pose> align(const std::vector<PosePair>& pairs, AlignmentKind kind
 std::vector<PosePair> place_estimates(const Pose& T_reference_estimate,
                                       std::vector<PosePair> pairs);
 
-/// As evo's: of magnitudes, median of an even number is the mean of the two in the middle.
+/// As evo's: of magnitudes; median of an even number is the mean of the two in the middle.
 struct Statistics {
   std::size_t count{0};
   double rmse{0.0};
   double mean{0.0};
   double median{0.0};
   double max{0.0};
+  double min{0.0};
+  double standard_deviation{0.0};  ///< about the mean, of all (not of a sample)
 };
 
 /// Of |values|; all NaN when there are none.

@@ -28,6 +28,7 @@ class MapOnEarth {
 
   /// Easting, northing, height above the ellipsoid (m), in the datum's zone.
   std::optional<Eigen::Vector3d> utm(const Eigen::Vector3d& position_map_m) const;
+  std::optional<Eigen::Vector3d> utm(const Geographic& place) const;
 
  private:
   LocalFrame frame_;
