@@ -432,7 +432,15 @@ TEST(Command, evaluate_tells_a_known_offset) {
   const CommandResult result = trigpoint({"evaluate", folder.path("e.tum"), folder.path("r.tum")});
   EXPECT_EQ(result.exit_code, 0) << result.output;
   EXPECT_THAT(result.output,
-              AllOf(HasSubstr("50 pairs"), HasSubstr("3.000"), HasSubstr("coverage 100.0 %")));
+              AllOf(HasSubstr("Pairs: 50"), HasSubstr("3.000"), HasSubstr("reference: 100.0 %")));
+  const std::string json = folder.path("result.json");
+  const std::vector<std::string> with_json{
+      "evaluate", folder.path("e.tum"), folder.path("r.tum"), "--json", json};
+  EXPECT_EQ(trigpoint(with_json).exit_code, 0);
+  EXPECT_THAT(tests::read_file(json), HasSubstr("\"x_m\": {\"rmse\": 3, "));
+  const CommandResult again = trigpoint(with_json);
+  EXPECT_EQ(again.exit_code, 2);
+  EXPECT_THAT(again.output, HasSubstr("is there already"));
 }
 
 TEST(Command, record_hears_what_play_says) {

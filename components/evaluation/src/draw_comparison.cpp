@@ -31,6 +31,13 @@ std::string word_of(const std::string& name) {
   return word;
 }
 
+/// As a title within single quotes.
+std::string title_of(const std::string& name) {
+  std::string title = name.substr(name.find_last_of('/') + 1);
+  std::erase(title, '\'');
+  return title;
+}
+
 /// The pairs of one estimate, aligned.
 struct Curve {
   std::string title;
@@ -54,8 +61,7 @@ std::vector<Curve> curves_of(const ComparisonBlock& block, AlignmentKind kind) {
       continue;
     }
     if (const auto T = align(compared.pairs, kind)) {
-      curves.push_back({compared.evaluation.estimate_name.substr(
-                            compared.evaluation.estimate_name.find_last_of('/') + 1),
+      curves.push_back({title_of(compared.evaluation.estimate_name),
                         place_estimates(*T, thinned(compared.pairs))});
     }
   }
@@ -97,10 +103,10 @@ std::string draw_errors(const ComparisonBlock& block,
   }
   constexpr std::array<const char*, 4> kAxes{"x (E) [m]", "y (N) [m]", "z (U) [m]", "3-D [m]"};
   std::ostringstream body;
-  body << "set multiplot layout 4,1 title 'Position error against " << word_of(block.reference_name)
-       << ", alignment: " << name_of(kind) << "' noenhanced\n"
+  body << "set multiplot layout 4,1 title 'Position error against "
+       << title_of(block.reference_name) << ", alignment: " << name_of(kind) << "' noenhanced\n"
        << "set grid lc rgb '#cccccc'\nset tics out nomirror\nset lmargin 10\nset rmargin 3\n"
-       << "set key inside top right horizontal noenhanced\n";
+       << "set key outside top center horizontal noenhanced\n";
   for (std::size_t axis = 0; axis < kAxes.size(); ++axis) {
     body << "set ylabel '" << kAxes[axis] << "'\n"
          << (axis + 1 == kAxes.size() ? "set xlabel 'time [s]'\nset yrange [0:*]\n" : "")
@@ -129,19 +135,23 @@ std::string draw_top_view(const ComparisonBlock& block,
        << "' noenhanced\nset xlabel 'x (E) [m]'\nset ylabel 'y (N) [m]'\nset size ratio -1\n"
        << "set grid lc rgb '#cccccc'\nset tics out nomirror\n"
        << "set key outside below center horizontal noenhanced\nplot ";
+  const auto longest =
+      std::max_element(curves.begin(), curves.end(), [](const auto& a, const auto& b) {
+        return a.pairs.size() < b.pairs.size();
+      });
+  DataFile reference;
+  for (const PosePair& pair : longest->pairs) {
+    reference.add({pair.reference.p.x(), pair.reference.p.y()});
+  }
+  const bool is_positions =
+      block.compared.front().evaluation.reference_kind == ReferenceKind::kPositions;
+  body << picture.data(name + "_reference.xy", reference) << " using 1:2 with "
+       << (is_positions ? "points pt 6 ps 0.8" : "lines lw 7") << " lc rgb '#f2c230' title '"
+       << title_of(block.reference_name) << "'";
   for (std::size_t i = 0; i < curves.size(); ++i) {
     DataFile rows;
-    DataFile reference;
     for (const PosePair& pair : curves[i].pairs) {
       rows.add({pair.estimate.p.x(), pair.estimate.p.y()});
-      reference.add({pair.reference.p.x(), pair.reference.p.y()});
-    }
-    if (i == 0) {
-      const bool is_positions =
-          block.compared.front().evaluation.reference_kind == ReferenceKind::kPositions;
-      body << picture.data(name + "_reference.xy", reference) << " using 1:2 with "
-           << (is_positions ? "points pt 6 ps 0.8" : "lines lw 7") << " lc rgb '#f2c230' title '"
-           << word_of(block.reference_name) << "'";
     }
     body << ", " << picture.data(name + "_" + word_of(curves[i].title) + ".xy", rows)
          << " using 1:2 with lines" << style_of(i) << " title '" << curves[i].title << "'";

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "trigpoint/evaluation/comparison.hpp"
+
+#include "made_session.hpp"
+#include "made_trajectories.hpp"
+#include "run_command.hpp"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+namespace trigpoint::evaluation {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using tests::TemporaryFolder;
+
+constexpr const char* kIdentity = "1 0 0 0 0 1 0 0 0 0 1 0\n";
+constexpr const char* kOneAhead = "1 0 0 1 0 1 0 0 0 0 1 0\n";
+
+std::string error_of(const ComparisonInput& input) {
+  try {
+    compare(input);
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "";
+}
+
+std::vector<std::string> names_of(const ComparisonBlock& block) {
+  std::vector<std::string> names;
+  for (const Compared& compared : block.compared) {
+    names.push_back(compared.evaluation.estimate_name);
+  }
+  return names;
+}
+
+TEST(Comparison, of_a_session_scores_every_trajectory_against_truth_and_both_kinds_of_fixes) {
+  const TemporaryFolder folder;
+  test::make_session(folder.path("s"));
+  const Comparison comparison = compare({folder.path("s"), "", "", ""});
+  ASSERT_EQ(comparison.blocks.size(), 3U);
+  EXPECT_THAT(names_of(comparison.blocks[0]), AllOf(Contains("fused.tum"), Contains("lio.tum")));
+  const Evaluation& fused = comparison.blocks[0].compared[0].evaluation;
+  ASSERT_EQ(fused.outages.size(), 1U);
+  constexpr double kMillimetre = 1e-3;
+  EXPECT_NEAR(fused.outages[0].max_m, test::kOutageEndError_m, 5.0 * kMillimetre);
+  EXPECT_NEAR(fused.good->axes_m[0].median, test::kFusedEastError_m, kMillimetre);
+  EXPECT_TRUE(fused.step->relative_to_lio);
+  const std::string text = print(comparison);
+  EXPECT_THAT(
+      text,
+      AllOf(HasSubstr("Alignment: SE(3)"), HasSubstr("Circular"), HasSubstr("lives in odom")));
+}
+
+TEST(Comparison, takes_a_session_as_the_reference_of_a_file_with_its_lever_arm_and_outages) {
+  const TemporaryFolder folder;
+  test::make_session(folder.path("s"));
+  const Comparison whole = compare({folder.path("s"), "", "", ""});
+  const Comparison file = compare({folder.path("s") + "/fused.tum", folder.path("s"), "", ""});
+  ASSERT_EQ(file.blocks.size(), 3U);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(file.blocks[i].compared[0].evaluation.scores[0].error.position_m.rmse,
+              whole.blocks[i].compared[0].evaluation.scores[0].error.position_m.rmse);
+  }
+  EXPECT_EQ(file.blocks[0].compared[0].evaluation.outages.size(), 1U);
+}
+
+TEST(Comparison, of_a_session_without_truth_says_so) {
+  const TemporaryFolder folder;
+  test::make_session(folder.path("s"), false);
+  const Comparison comparison = compare({folder.path("s"), "", "", ""});
+  EXPECT_THAT(comparison.remarks, Contains(HasSubstr("no truth.tum")));
+  EXPECT_EQ(comparison.blocks.front().reference_name, "withheld fixes");
+}
+
+TEST(Comparison, of_kitti_files_without_times_goes_pose_by_pose) {
+  const TemporaryFolder folder;
+  tests::write_file(folder.path("r.txt"), std::string(kIdentity) + kIdentity + kIdentity);
+  tests::write_file(folder.path("e.txt"), std::string(kOneAhead) + kOneAhead + kOneAhead);
+  const Comparison comparison = compare({folder.path("e.txt"), folder.path("r.txt"), "", ""});
+  const Evaluation& evaluation = comparison.blocks[0].compared[0].evaluation;
+  EXPECT_EQ(evaluation.pairs, 3U);
+  EXPECT_EQ(evaluation.scores[0].error.axes_m[0].rmse, 1.0);
+  tests::write_file(folder.path("short.txt"), kIdentity);
+  EXPECT_THAT(error_of({folder.path("short.txt"), folder.path("r.txt"), "", ""}),
+              AllOf(HasSubstr("1 poses"), HasSubstr("hold no times")));
+}
+
+TEST(Comparison, of_kitti_with_tum_goes_by_the_times_beside_the_file) {
+  const TemporaryFolder folder;
+  tests::write_file(folder.path("e.txt"), std::string(kOneAhead) + kOneAhead);
+  tests::write_file(folder.path("r.tum"), "5.0 0 0 0 0 0 0 1\n5.1 0 0 0 0 0 0 1\n");
+  EXPECT_THAT(error_of({folder.path("e.txt"), folder.path("r.tum"), "", ""}),
+              HasSubstr("hold no times"));
+  tests::write_file(folder.path("e_times.txt"), "5.02\n5.08\n");
+  const Comparison comparison = compare({folder.path("e.txt"), folder.path("r.tum"), "", ""});
+  EXPECT_EQ(comparison.blocks[0].compared[0].evaluation.pairs, 2U);
+}
+
+TEST(Comparison, tells_why_there_is_nothing_to_compare) {
+  const TemporaryFolder folder;
+  tests::write_file(folder.path("a.tum"), "1.0 0 0 0 0 0 0 1\n");
+  tests::write_file(folder.path("b.tum"), "9.0 0 0 0 0 0 0 1\n");
+  tests::write_file(folder.path("empty.tum"), "# nothing\n");
+  EXPECT_THAT(error_of({folder.path("a.tum"), folder.path("b.tum"), "", ""}),
+              AllOf(HasSubstr("no moment in common"), HasSubstr("9.000000000")));
+  EXPECT_THAT(error_of({folder.path("a.tum"), folder.path("empty.tum"), "", ""}),
+              HasSubstr("holds no pose"));
+  EXPECT_THAT(error_of({folder.path("a.tum"), "", "", ""}), HasSubstr("needs a reference"));
+}
+
+TEST(Comparison, is_drawn_for_each_reference) {
+  if (!std::filesystem::exists("/usr/bin/gnuplot")) {
+    GTEST_SKIP() << "gnuplot is not installed";
+  }
+  const TemporaryFolder folder;
+  test::make_session(folder.path("s"));
+  const auto pictures = draw(compare({folder.path("s"), "", "", ""}), folder.path("pictures"));
+  EXPECT_EQ(pictures.size(), 9U);
+  for (const std::string& picture : pictures) {
+    EXPECT_GT(std::filesystem::file_size(picture), 5000U) << picture;
+  }
+}
+
+}  // namespace
+}  // namespace trigpoint::evaluation
