@@ -2,11 +2,17 @@
 // Copyright the Trigpoint developers
 #include "trigpoint/base/config.hpp"
 #include "trigpoint/evaluation/comparison.hpp"
+#include "trigpoint/evaluation/map_quality.hpp"
 #include "trigpoint/export/session.hpp"
+#include "trigpoint/geodesy/map_on_earth.hpp"
+#include "trigpoint/simulator/scenario.hpp"
+#include "trigpoint/simulator/surfaces.hpp"
 
+#include "input.hpp"
 #include "number_checks.hpp"
 #include "verbs.hpp"
 
+#include <cstdint>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -21,7 +27,42 @@ struct EvaluateOptions {
   double largest_gap_s{to_seconds(evaluation::kDefaultGap_ns)};
   std::string json_file;
   std::string plots_folder;
+  bool map{false};
+  std::string scenario;  ///< whose world is the map's truth
+  std::uint64_t seed{1};
 };
+
+/// Distances in the session's map to the surfaces of a scenario's world, which lie in the map of
+/// the scenario's datum.
+evaluation::SurfaceDistance surface_distance(const EvaluateOptions& options) {
+  const simulator::Scenario scenario = simulator::load_scenario(options.scenario);
+  const auto surfaces = std::make_shared<simulator::Surfaces>(scenario, options.seed);
+  const std::string datum_file =
+      exporter::path_in(options.input.estimate, exporter::session_file::kDatum);
+  if (!std::filesystem::exists(datum_file)) {
+    throw ConfigError(options.input.estimate +
+                      ": has no datum.yaml, so its map cannot be laid over the scenario's world");
+  }
+  const geodesy::MapOnEarth session_map(exporter::read_datum(datum_file));
+  const geodesy::LocalFrame scenario_map(scenario.datum);
+  return [surfaces, session_map, scenario_map](
+             const Eigen::Vector3d& p_map_m) -> std::optional<double> {
+    const auto p_scenario_m = scenario_map.to_map(session_map.geographic(p_map_m));
+    return p_scenario_m ? surfaces->distance_m(*p_scenario_m) : std::nullopt;
+  };
+}
+
+void check_map_options(const EvaluateOptions& options) {
+  if (!options.map && !options.scenario.empty()) {
+    throw ConfigError("--scenario is the truth of --map, which is not asked for");
+  }
+  if (options.map && !std::filesystem::is_directory(options.input.estimate)) {
+    throw ConfigError("--map needs a session folder, " + options.input.estimate + " is a file");
+  }
+  if (!options.scenario.empty()) {
+    require_scenario(options.scenario);
+  }
+}
 
 void refuse_to_overwrite(const EvaluateOptions& options) {
   if (std::filesystem::exists(options.json_file)) {
@@ -35,7 +76,13 @@ void refuse_to_overwrite(const EvaluateOptions& options) {
 int run(EvaluateOptions options) {
   refuse_to_overwrite(options);
   options.input.largest_gap_ns = from_seconds(options.largest_gap_s);
-  const evaluation::Comparison comparison = evaluation::compare(options.input);
+  check_map_options(options);
+  evaluation::Comparison comparison = evaluation::compare(options.input);
+  if (options.map) {
+    comparison.map = evaluation::map_quality(
+        options.input.estimate,
+        options.scenario.empty() ? evaluation::SurfaceDistance{} : surface_distance(options));
+  }
   std::cout << evaluation::print(comparison);
   if (!options.json_file.empty()) {
     exporter::write_text(options.json_file, evaluation::to_json(comparison));
@@ -68,6 +115,15 @@ void add_evaluate(CLI::App& app, Chosen& chosen) {
       ->check(CLI::ExistingPath);
   verb->add_option("--json", options->json_file, "file for every figure with all its digits");
   verb->add_option("--plots", options->plots_folder, "folder for pictures, made here");
+  verb->add_flag(
+      "--map", options->map, "also how sharp the session's map is, and how double its walls");
+  verb->add_option("--scenario",
+                   options->scenario,
+                   "with --map: the scenario that the session is of; distances of the map's points "
+                   "to its surfaces");
+  verb->add_option("--seed", options->seed, "of that scenario")
+      ->capture_default_str()
+      ->check(whole_number());
   verb->add_option("--lio",
                    options->input.lio_file,
                    "TUM file in odom: steps are told beyond its own change")

@@ -288,7 +288,7 @@ std::string print(const Comparison& comparison) {
   for (const std::string& remark : comparison.remarks) {
     text += remark + "\n";
   }
-  return text;
+  return comparison.map ? text + "\n" + print(*comparison.map) : text;
 }
 
 }  // namespace trigpoint::evaluation

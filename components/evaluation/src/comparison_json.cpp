@@ -145,7 +145,12 @@ std::string to_json(const Comparison& comparison) {
   for (const std::string& remark : comparison.remarks) {
     remarks.push_back(text(remark));
   }
-  return Object().add("blocks", array(blocks)).add("remarks", array(remarks)).str() + "\n";
+  Object object;
+  object.add("blocks", array(blocks)).add("remarks", array(remarks));
+  if (comparison.map) {
+    object.add("map", to_json(*comparison.map));
+  }
+  return object.str() + "\n";
 }
 
 }  // namespace trigpoint::evaluation

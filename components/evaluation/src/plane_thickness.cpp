@@ -2,6 +2,8 @@
 // Copyright the Trigpoint developers
 #include "trigpoint/evaluation/plane_thickness.hpp"
 
+#include "facades.hpp"
+#include "place_hash.hpp"
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
@@ -46,23 +48,11 @@ constexpr double kLeastHeight_m = 1.5;
 constexpr double kLowRank = 0.158655;
 constexpr double kHighRank = 0.841345;
 
-using CellKey = std::array<std::int32_t, 3>;
+using CellKey = FacadeCell;
 using Points = std::vector<Vector3d>;
 
 std::int32_t index_of(double x_m, double side_m) {
   return static_cast<std::int32_t>(std::floor(x_m / side_m));
-}
-
-/// Evenly spread over 64 bits (finaliser of splitmix64, S. Vigna).
-std::uint64_t hash_of(const CellKey& key) {
-  std::uint64_t h = 0;
-  for (const std::int32_t i : key) {
-    h = (h ^ static_cast<std::uint32_t>(i)) + 0x9E3779B97F4A7C15ULL;
-    h = (h ^ (h >> 30U)) * 0xBF58476D1CE4E5B9ULL;
-    h = (h ^ (h >> 27U)) * 0x94D049BB133111EBULL;
-    h ^= h >> 31U;
-  }
-  return h;
 }
 
 /// The given rank of unsorted values, which are reordered.
@@ -75,7 +65,6 @@ double at_rank(std::vector<double>& values, double rank) {
 
 std::map<CellKey, Points> fill_cells(const PointCloud& cloud, double share) {
   constexpr double kFar_m = 1e7;  // an index of that size still fits
-  const auto limit = static_cast<std::uint64_t>(share * 0x1p63);
   std::map<CellKey, Points> cells;
   for (const PointXyzi& point : cloud) {
     const Vector3d p = point.position().cast<double>();
@@ -90,7 +79,7 @@ std::map<CellKey, Points> fill_cells(const PointCloud& cloud, double share) {
            j <= index_of(p.y() + kMargin_m, kCell_m);
            ++j) {
         const CellKey key{i, j, k};
-        if (share >= 1.0 || (hash_of(key) >> 1U) < limit) {
+        if (is_drawn(key, share)) {
           cells[key].push_back(p);
         }
       }
@@ -123,12 +112,7 @@ Points upright(const Points& points) {
   return kept;
 }
 
-struct Plane {
-  Vector3d normal;
-  Vector3d centre_m;
-
-  double distance_m(const Vector3d& p) const { return normal.dot(p - centre_m); }
-};
+using Plane = Facade;
 
 Points near_to(const Plane& plane, const Points& points, double distance_m) {
   Points near;
@@ -261,6 +245,29 @@ std::optional<double> offset_in(const CellKey& key, const Points& first, const P
 }
 
 }  // namespace
+
+std::map<FacadeCell, Facade> facades_of(const PointCloud& cloud) {
+  std::map<FacadeCell, Facade> facades;
+  for (const auto& [key, points] : fill_cells(cloud, 1.0)) {
+    const Points standing = upright(points);
+    const std::optional<Plane> plane =
+        standing.size() < kLeastPoints ? std::nullopt : facade_in(standing);
+    if (plane) {
+      facades.emplace(key, *plane);
+    }
+  }
+  return facades;
+}
+
+std::optional<double> distance_between(const FacadeCell& cell,
+                                       const Facade& first,
+                                       const Facade& second) {
+  if (!is_own(first, cell) || std::abs(first.normal.dot(second.normal)) < std::cos(kMostTilt)) {
+    return std::nullopt;
+  }
+  const double offset_m = std::abs(first.distance_m(second.centre_m));
+  return offset_m <= kWindow_m ? std::optional(offset_m) : std::nullopt;
+}
 
 FacadeOffset facade_offset(const PointCloud& first, const PointCloud& second) {
   const auto of_first = fill_cells(first, 1.0);

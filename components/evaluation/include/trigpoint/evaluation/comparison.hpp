@@ -4,7 +4,9 @@
 #pragma once
 
 #include "trigpoint/evaluation/evaluate.hpp"
+#include "trigpoint/evaluation/map_quality.hpp"
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,6 +40,7 @@ struct ComparisonBlock {
 struct Comparison {
   std::vector<ComparisonBlock> blocks;
   std::vector<std::string> remarks;  ///< what could not be compared, and why; a sentence each
+  std::optional<MapQuality> map;     ///< filled in by who wants it (map_quality.hpp)
 };
 
 /// Throws std::runtime_error naming file, line and cause, and when nothing has a moment in common

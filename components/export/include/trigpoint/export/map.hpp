@@ -6,6 +6,7 @@
 
 #include "trigpoint/base/measurements.hpp"
 #include "trigpoint/base/messages.hpp"
+#include "trigpoint/base/pose.hpp"
 
 #include <Eigen/Core>
 
@@ -51,6 +52,12 @@ MapReport render_map(const std::string& keyframes_file,
                      const std::string& out_pcd,
                      const std::function<void(double)>& progress = {},
                      const MapCorrections& corrections = {});
+
+using VisitKeyframe = std::function<void(const Pose& T_frame_base, const PointCloud& points_frame)>;
+
+/// Every keyframe of a session that keyframes.tum places, in order of time, in the frame that it
+/// names. False, and nothing visited, when the session holds no keyframes or no keyframes.tum.
+bool visit_placed_keyframes(const std::string& session, const VisitKeyframe& visit);
 
 /// Binary PCD with x y z intensity.
 void write_pcd(const std::string& file, const PointCloud& cloud);
