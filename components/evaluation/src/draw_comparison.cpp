@@ -41,6 +41,7 @@ std::string title_of(const std::string& name) {
 /// The pairs of one estimate, aligned.
 struct Curve {
   std::string title;
+  std::string style;
   std::vector<PosePair> pairs;
 };
 
@@ -54,6 +55,7 @@ std::vector<PosePair> thinned(const std::vector<PosePair>& pairs) {
   return few;
 }
 
+/// The first one is drawn last, over the others: it is the one that is published.
 std::vector<Curve> curves_of(const ComparisonBlock& block, AlignmentKind kind) {
   std::vector<Curve> curves;
   for (const Compared& compared : block.compared) {
@@ -61,10 +63,13 @@ std::vector<Curve> curves_of(const ComparisonBlock& block, AlignmentKind kind) {
       continue;
     }
     if (const auto T = align(compared.pairs, kind)) {
+      const char* colour = kColours[curves.size() % kColours.size()];
       curves.push_back({title_of(compared.evaluation.estimate_name),
+                        std::string(" lw 1.8 lc rgb '") + colour + "'",
                         place_estimates(*T, thinned(compared.pairs))});
     }
   }
+  std::reverse(curves.begin(), curves.end());
   return curves;
 }
 
@@ -74,10 +79,6 @@ Nanoseconds begin_of(const std::vector<Curve>& curves) {
     begin_ns = std::min(begin_ns, curve.pairs.front().stamp_ns);
   }
   return begin_ns;
-}
-
-std::string style_of(std::size_t curve) {
-  return " lw 1.8 lc rgb '" + std::string(kColours[curve % kColours.size()]) + "'";
 }
 
 std::string draw_errors(const ComparisonBlock& block,
@@ -113,7 +114,7 @@ std::string draw_errors(const ComparisonBlock& block,
          << (axis == 1 ? "unset key\n" : "") << "plot ";
     for (std::size_t i = 0; i < files.size(); ++i) {
       body << (i == 0 ? "" : ", ") << files[i] << " using 1:" << axis + 2 << " with lines"
-           << style_of(i) << " title '" << curves[i].title << "'";
+           << curves[i].style << " title '" << curves[i].title << "'";
     }
     body << "\n";
   }
@@ -132,7 +133,7 @@ std::string draw_top_view(const ComparisonBlock& block,
   const Picture picture(exporter::path_in(folder, "plots"), name);
   std::ostringstream body;
   body << "set title 'Top view, alignment: " << name_of(AlignmentKind::kYawTranslation)
-       << "' noenhanced\nset xlabel 'x (E) [m]'\nset ylabel 'y (N) [m]'\nset size ratio -1\n"
+       << "' noenhanced\nset xlabel 'x (E) [m]' offset 0,0.6\nset ylabel 'y (N) [m]'\nset size ratio -1\n"
        << "set grid lc rgb '#cccccc'\nset tics out nomirror\n"
        << "set key outside below center horizontal noenhanced\nplot ";
   const auto longest =
@@ -154,7 +155,7 @@ std::string draw_top_view(const ComparisonBlock& block,
       rows.add({pair.estimate.p.x(), pair.estimate.p.y()});
     }
     body << ", " << picture.data(name + "_" + word_of(curves[i].title) + ".xy", rows)
-         << " using 1:2 with lines" << style_of(i) << " title '" << curves[i].title << "'";
+         << " using 1:2 with lines" << curves[i].style << " title '" << curves[i].title << "'";
   }
   body << "\n";
   return picture.draw(gnuplot, kWidth_px, 900, body.str());
