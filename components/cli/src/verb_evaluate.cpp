@@ -64,6 +64,13 @@ void check_map_options(const EvaluateOptions& options) {
   }
 }
 
+void check_inputs(const EvaluateOptions& options) {
+  if (!options.input.lio_file.empty() && std::filesystem::is_directory(options.input.estimate)) {
+    throw ConfigError("--lio goes with a file; the session " + options.input.estimate +
+                      " brings its own lio.tum");
+  }
+}
+
 void refuse_to_overwrite(const EvaluateOptions& options) {
   if (std::filesystem::exists(options.json_file)) {
     throw ConfigError(options.json_file + ": is there already, choose another file");
@@ -77,6 +84,8 @@ int run(EvaluateOptions options) {
   refuse_to_overwrite(options);
   options.input.largest_gap_ns = from_seconds(options.largest_gap_s);
   check_map_options(options);
+  check_inputs(options);
+  options.input.may_be_empty = options.map;
   evaluation::Comparison comparison = evaluation::compare(options.input);
   if (options.map) {
     comparison.map = evaluation::map_quality(

@@ -57,16 +57,26 @@ PoseFile read_poses(const std::string& path) {
   return result;
 }
 
-/// KITTI files without times are compared pose by pose.
-void check_indices(const ComparisonInput& input, const PoseFile& estimate, const PoseFile& other) {
-  const auto a = estimate.trajectory.size();
-  const auto b = other.trajectory.size();
-  if (estimate.is_by_index != other.is_by_index || (estimate.is_by_index && a != b)) {
-    throw std::runtime_error(input.estimate + " (" + std::to_string(a) + " poses) and " +
-                             input.reference + " (" + std::to_string(b) +
-                             " poses): KITTI files hold no times; without a NAME_times.txt or "
-                             "times.txt beside them only two of equal length can be compared");
+/// KITTI files without times are compared pose by pose, with nothing else. Null: a session.
+void check_indices(const ComparisonInput& input, const PoseFile* estimate, const PoseFile* other) {
+  const auto is_by_index = [](const PoseFile* file) {
+    return file != nullptr && file->is_by_index;
+  };
+  if (!is_by_index(estimate) && !is_by_index(other)) {
+    return;
   }
+  const bool are_alike = is_by_index(estimate) && is_by_index(other) &&
+                         estimate->trajectory.size() == other->trajectory.size();
+  if (are_alike) {
+    return;
+  }
+  const auto told = [](const std::string& path, const PoseFile* file) {
+    return path + (file == nullptr ? " (a session)"
+                                   : " (" + std::to_string(file->trajectory.size()) + " poses)");
+  };
+  throw std::runtime_error(told(input.estimate, estimate) + " and " + told(input.reference, other) +
+                           ": KITTI files hold no times; without a NAME_times.txt or times.txt "
+                           "beside them only two of equal length can be compared");
 }
 
 std::vector<Estimate> estimates_of(const SessionData& session) {
@@ -182,18 +192,21 @@ Sides read_sides(const ComparisonInput& input, Comparison& comparison) {
       sides.estimates.back().lio = exporter::read_trajectory(input.lio_file);
     }
   }
+  std::optional<PoseFile> reference_file;
+  if (!reference_is_session) {
+    reference_file = read_poses(reference);
+  }
+  check_indices(input,
+                estimate_file ? &*estimate_file : nullptr,
+                reference_file ? &*reference_file : nullptr);
   if (reference_is_session) {
     const SessionData session = load_session(reference, {});
     sides.references = references_of(session, comparison);
     sides.outages = session.outages();
   } else {
-    PoseFile other = read_poses(reference);
-    if (estimate_file) {
-      check_indices(input, *estimate_file, other);
-    }
-    sides.references.push_back({reference, "", ReferenceKind::kPoses, std::move(other.trajectory)});
+    sides.references.push_back({reference, "", ReferenceKind::kPoses, reference_file->trajectory});
   }
-  if (!input.fixes_file.empty()) {
+  if (!input.fixes_file.empty() && !sides.estimates.empty()) {
     const Trajectory& first = sides.estimates.front().trajectory;
     sides.outages = outages_in(input.fixes_file, first.back().stamp_ns);
   }
@@ -259,7 +272,7 @@ Comparison compare(const ComparisonInput& input) {
       comparison.blocks.push_back(std::move(block));
     }
   }
-  if (comparison.blocks.empty()) {
+  if (comparison.blocks.empty() && !input.may_be_empty) {
     std::string reasons;
     for (const std::string& remark : comparison.remarks) {
       reasons += (reasons.empty() ? "" : " ") + remark;

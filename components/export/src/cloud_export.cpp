@@ -121,8 +121,11 @@ class CloudOutputs {
   std::vector<Output> outputs_;
 };
 
-Eigen::Vector2d lon_lat(const geodesy::Geographic& place) {
-  return {place.longitude_deg, place.latitude_deg};
+/// Longitudes go on beyond 180 degrees, as seen from the datum, so that a map on the antimeridian
+/// stays in one piece.
+Eigen::Vector2d lon_lat(const geodesy::MapOnEarth& earth, const geodesy::Geographic& place) {
+  const double datum_deg = earth.datum().longitude_deg;
+  return {datum_deg + std::remainder(place.longitude_deg - datum_deg, 360.0), place.latitude_deg};
 }
 
 /// Cells of about `cell_m` along both axes at this latitude.
@@ -208,7 +211,7 @@ CloudSurvey survey(const CloudExport& job, const std::function<void(double)>& pr
       }
       const Place place = place_of(*job.earth, point.position().cast<double>());
       const Eigen::Vector3d& utm_m = place.utm_m;
-      const Eigen::Vector2d place_deg = lon_lat(place.geographic);
+      const Eigen::Vector2d place_deg = lon_lat(*job.earth, place.geographic);
       result.lowest_utm_m = result.lowest_utm_m.cwiseMin(utm_m);
       result.highest_utm_m = result.highest_utm_m.cwiseMax(utm_m);
       result.lowest_deg = result.lowest_deg.cwiseMin(place_deg);
@@ -241,7 +244,7 @@ CloudExportResult export_cloud(const CloudExport& job,
         views.utm->add(place.utm_m.head<2>(), place.utm_m.z());
       }
       if (views.degrees) {
-        views.degrees->add(lon_lat(place.geographic), place.geographic.height_m);
+        views.degrees->add(lon_lat(*job.earth, place.geographic), place.geographic.height_m);
       }
     }
     outputs.append(in_frame, in_utm);

@@ -21,6 +21,8 @@ namespace fs = std::filesystem;
 
 /// More poses a second make Google Earth and hiking programs slow and show nothing.
 constexpr Nanoseconds kTrackInterval_ns = 100'000'000;
+/// The tiles' names tell their corners in metres.
+constexpr double kSmallestTile_m = 1.0;
 constexpr const char* kPicture = "top_view.png";
 constexpr const char* kHidden = ".map_for_export.pcd";
 
@@ -89,6 +91,10 @@ void check(const Work& work) {
     if (std::none_of(known.begin(), known.end(), [&](const auto& f) { return f.name == name; })) {
       throw std::runtime_error("unknown format '" + name + "', there are: " + names_of_formats());
     }
+  }
+  if (work.options.tile_m > 0.0 && work.options.tile_m < kSmallestTile_m) {
+    throw std::runtime_error("tiles must have an edge of 1 m or more, got " +
+                             std::to_string(work.options.tile_m) + " m");
   }
   if (fs::exists(work.out) && fs::equivalent(work.session, work.out)) {
     throw std::runtime_error(work.out + ": is the session itself, choose another folder");

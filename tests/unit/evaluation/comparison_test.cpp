@@ -113,6 +113,25 @@ TEST(Comparison, tells_why_there_is_nothing_to_compare) {
   EXPECT_THAT(error_of({folder.path("a.tum"), "", "", ""}), HasSubstr("needs a reference"));
 }
 
+TEST(Comparison, of_a_session_with_kitti_needs_times_too) {
+  const TemporaryFolder folder;
+  test::make_session(folder.path("s"));
+  tests::write_file(folder.path("e.txt"), kIdentity);
+  EXPECT_THAT(error_of({folder.path("e.txt"), folder.path("s"), "", ""}),
+              AllOf(HasSubstr("(a session)"), HasSubstr("hold no times")));
+}
+
+TEST(Comparison, of_a_session_without_any_reference_is_an_error_unless_that_is_allowed) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder.path("s"));
+  tests::write_file(folder.path("s/lio.tum"), "1.0 0 0 0 0 0 0 1\n");
+  ComparisonInput input;
+  input.estimate = folder.path("s");
+  EXPECT_THAT(error_of(input), AllOf(HasSubstr("nothing to compare"), HasSubstr("no datum")));
+  input.may_be_empty = true;
+  EXPECT_TRUE(compare(input).blocks.empty());
+}
+
 TEST(Comparison, is_drawn_for_each_reference) {
   if (!std::filesystem::exists("/usr/bin/gnuplot")) {
     GTEST_SKIP() << "gnuplot is not installed";

@@ -174,6 +174,27 @@ TEST_F(ExportSession, leaves_no_hidden_file_and_writes_tiles_of_the_same_points)
   EXPECT_EQ(read_pcd(out("map_pcd/map_0_0.pcd")).size(), 1U);
 }
 
+TEST_F(ExportSession, refuses_tiles_whose_names_would_be_the_same) {
+  write_keyframe();
+  EXPECT_THAT(error_of([&] {
+                export_session(session(), out(), {{"pcd"}, 0.1, 0.5});
+              }),
+              HasSubstr("1 m or more"));
+}
+
+TEST_F(ExportSession, keeps_a_map_on_the_antimeridian_in_one_piece) {
+  lio_mapper::KeyframeWriter writer(path_in(session(), session_file::kKeyframes));
+  lio_mapper::Keyframe keyframe;
+  keyframe.stamp_ns = 1;
+  keyframe.points_base = {{-20.0F, 0.0F, 0.0F, 0.0F}, {20.0F, 0.0F, 0.0F, 0.0F}};
+  writer.append(keyframe);
+  write_alignment(path_in(session(), session_file::kAlignment), {});
+  write_datum(path_in(session(), session_file::kDatum), {-17.0, 180.0, 5.0});
+  export_session(session(), out(), {{"kml"}});
+  const std::string kml = read_all(out("session.kml"));
+  EXPECT_THAT(kml, AllOf(HasSubstr("<east>180.0001"), HasSubstr("<west>179.9998")));
+}
+
 TEST_F(ExportSession, places_lio_once_so_that_its_drift_shows) {
   // lio sees 2 m where fused, which starts at (10, 0), sees 1 m.
   TrajectoryWriter fused(path_in(session(), session_file::kFused), "base_link in map");

@@ -21,6 +21,7 @@ struct ComparisonInput {
   std::string lio_file;    ///< TUM in odom, to judge steps of a file against; a session has its own
   std::string fixes_file;  ///< fixes.csv, for outages; a session has its own
   Nanoseconds largest_gap_ns{kDefaultGap_ns};
+  bool may_be_empty{false};  ///< nothing to compare is told in the remarks and is no error
 };
 
 /// One estimate against one reference, with the pairs that the figures are of.
