@@ -19,12 +19,14 @@
 #include <pcl/io/pcd_io.h>
 #include <pcl/io/ply_io.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
 #include <memory>
 #include <numbers>
 #include <sstream>
+#include <vector>
 
 namespace trigpoint::exporter {
 namespace {
@@ -34,6 +36,7 @@ using test::ScratchFolder;
 
 constexpr Nanoseconds kStamp_ns = 1'700'000'000'250'000'000;
 const Eigen::Vector3d kLandmark_map_m{1234.5, -876.25, 42.125};
+const Eigen::Vector3d kOther_map_m{1194.5, -886.25, 40.125};
 
 constexpr double kMicrometre = 1e-6;
 /// PROJ's and GeographicLib's series, and 1e-6 m of TUM files.
@@ -114,10 +117,11 @@ class Landmark : public testing::TestWithParam<Place> {
     lio_mapper::KeyframeWriter writer(path_in(session, session_file::kKeyframes));
     lio_mapper::Keyframe keyframe;
     keyframe.stamp_ns = kStamp_ns;
-    keyframe.points_base = {{static_cast<float>(kLandmark_map_m.x()),
-                             static_cast<float>(kLandmark_map_m.y()),
-                             static_cast<float>(kLandmark_map_m.z()),
-                             100.0F}};
+    // The other point makes bounds and pictures that are not square; it is first in every file.
+    for (const Eigen::Vector3d& p_map_m : {kOther_map_m, kLandmark_map_m}) {
+      const Eigen::Vector3f p = p_map_m.cast<float>();
+      keyframe.points_base.push_back({p.x(), p.y(), p.z(), 100.0F});
+    }
     writer.append(keyframe);
   }
 
@@ -171,19 +175,19 @@ Integer integer_at(const std::string& bytes, std::size_t offset) {
 TEST_P(Landmark, is_in_the_pcd_at_its_place_in_map) {
   pcl::PCLPointCloud2 cloud;
   ASSERT_EQ(pcl::PCDReader().read(out("map.pcd"), cloud), 0);
-  ASSERT_EQ(cloud.width, 1U);
+  ASSERT_EQ(cloud.width, 2U);
   float xyz[3];
-  std::memcpy(xyz, cloud.data.data(), sizeof(xyz));
+  std::memcpy(xyz, cloud.data.data() + cloud.point_step, sizeof(xyz));
   EXPECT_EQ(Eigen::Vector3f(xyz[0], xyz[1], xyz[2]), kLandmark_map_m.cast<float>());
 }
 
 TEST_P(Landmark, is_in_the_ply_in_utm) {
   pcl::PCLPointCloud2 cloud;
   ASSERT_EQ(pcl::PLYReader().read(out("map.ply"), cloud), 0);
-  ASSERT_EQ(cloud.width * cloud.height, 1U);
+  ASSERT_EQ(cloud.width * cloud.height, 2U);
   ASSERT_EQ(cloud.fields.at(0).datatype, pcl::PCLPointField::FLOAT64);
   double xyz[3];
-  std::memcpy(xyz, cloud.data.data(), sizeof(xyz));
+  std::memcpy(xyz, cloud.data.data() + cloud.point_step, sizeof(xyz));
   EXPECT_LT((Eigen::Vector3d(xyz[0], xyz[1], xyz[2]) - utm_).norm(), kSeries_m);
 }
 
@@ -194,17 +198,20 @@ TEST_P(Landmark, is_in_the_las_in_utm) {
   EXPECT_EQ(integer_at<std::uint8_t>(las, 24), 1);
   EXPECT_EQ(integer_at<std::uint8_t>(las, 25), 4);
   EXPECT_EQ(integer_at<std::uint16_t>(las, 6), 16) << "the WKT bit alone";
-  EXPECT_EQ(integer_at<std::uint64_t>(las, 247), 1U);
+  EXPECT_EQ(integer_at<std::uint64_t>(las, 247), 2U);
+  EXPECT_EQ(integer_at<std::uint64_t>(las, 255), 2U) << "all are first returns";
   const auto data = integer_at<std::uint32_t>(las, 96);
-  ASSERT_EQ(las.size(), data + 30U);
+  ASSERT_EQ(las.size(), data + 60U);
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const auto steps = integer_at<std::int32_t>(las, data + 4 * axis);
+    const auto steps = integer_at<std::int32_t>(las, data + 30 + 4 * axis);
     const double value = steps * double_at(las, 131 + 8 * axis) + double_at(las, 155 + 8 * axis);
     EXPECT_NEAR(value, utm_[static_cast<Eigen::Index>(axis)], kLasStep_m);
     EXPECT_NEAR(double_at(las, 179 + 16 * axis), value, kMicrometre) << "highest";
-    EXPECT_NEAR(double_at(las, 187 + 16 * axis), value, kMicrometre) << "lowest";
+    const double other =
+        integer_at<std::int32_t>(las, data + 4 * axis) * 0.001 + double_at(las, 155 + 8 * axis);
+    EXPECT_NEAR(double_at(las, 187 + 16 * axis), other, kMicrometre) << "lowest";
   }
-  EXPECT_EQ(integer_at<std::uint16_t>(las, data + 12), 100 * 257) << "of 255";
+  EXPECT_EQ(integer_at<std::uint16_t>(las, data + 30 + 12), 100 * 257) << "of 255";
   OGRSpatialReference reference;
   ASSERT_EQ(reference.importFromWkt(las.substr(375 + 54, data - 375 - 54 - 1).c_str()),
             OGRERR_NONE);
@@ -248,7 +255,7 @@ TEST_P(Landmark, is_in_geojson_gpx_kml_and_kmz) {
               testing::HasSubstr("<time>2023-11-14T22:13:20.250Z</time>"));
 }
 
-TEST_P(Landmark, is_the_only_cell_of_the_geotiffs) {
+TEST_P(Landmark, is_in_its_cell_of_the_geotiffs) {
   for (const char* name : {"height.tif", "top_view.tif"}) {
     const std::unique_ptr<GDALDataset> tiff(GDALDataset::Open(out(name).c_str(), GDAL_OF_RASTER));
     ASSERT_TRUE(tiff) << name;
@@ -267,7 +274,7 @@ TEST_P(Landmark, is_the_only_cell_of_the_geotiffs) {
   }
 }
 
-TEST_P(Landmark, lies_in_the_opaque_cell_of_the_overlay) {
+TEST_P(Landmark, and_the_other_point_are_the_opaque_cells_of_the_overlay) {
   const std::string kml = read_all(out("session.kml"));
   const auto border = [&](const std::string& name) {
     const auto at = kml.find("<" + name + ">") + name.size() + 2;
@@ -276,22 +283,26 @@ TEST_P(Landmark, lies_in_the_opaque_cell_of_the_overlay) {
   const std::unique_ptr<GDALDataset> png(
       GDALDataset::Open(out("top_view.png").c_str(), GDAL_OF_RASTER));
   ASSERT_TRUE(png);
-  const double across = (lon_lat_h_.x() - border("west")) / (border("east") - border("west"));
-  const double down = (border("north") - lon_lat_h_.y()) / (border("north") - border("south"));
-  std::uint8_t alpha = 0;
-  ASSERT_EQ(png->GetRasterBand(4)->RasterIO(GF_Read,
-                                            static_cast<int>(across * png->GetRasterXSize()),
-                                            static_cast<int>(down * png->GetRasterYSize()),
-                                            1,
-                                            1,
-                                            &alpha,
-                                            1,
-                                            1,
-                                            GDT_Byte,
-                                            0,
-                                            0),
+  const int columns = png->GetRasterXSize();
+  const int rows = png->GetRasterYSize();
+  std::vector<std::uint8_t> alpha(static_cast<std::size_t>(columns) *
+                                  static_cast<std::size_t>(rows));
+  ASSERT_EQ(png->GetRasterBand(4)->RasterIO(
+                GF_Read, 0, 0, columns, rows, alpha.data(), columns, rows, GDT_Byte, 0, 0),
             CE_None);
-  EXPECT_EQ(alpha, 255);
+  EXPECT_EQ(std::count(alpha.begin(), alpha.end(), 255), 2);
+  constexpr int kGeographic3d = 4979;
+  constexpr int kGeocentric = 4978;
+  for (const Eigen::Vector3d& p_map_m : {kLandmark_map_m, kOther_map_m}) {
+    const Eigen::Vector3d place =
+        transformed(kGeocentric, kGeographic3d, geocentric_of(GetParam().datum, p_map_m));
+    const double across = (place.x() - border("west")) / (border("east") - border("west"));
+    const double down = (border("north") - place.y()) / (border("north") - border("south"));
+    const auto cell = static_cast<std::size_t>(down * rows) * static_cast<std::size_t>(columns) +
+                      static_cast<std::size_t>(across * columns);
+    ASSERT_LT(cell, alpha.size());
+    EXPECT_EQ(alpha[cell], 255) << p_map_m.transpose();
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(
