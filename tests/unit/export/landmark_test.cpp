@@ -298,6 +298,7 @@ TEST_P(Landmark, and_the_other_point_are_the_opaque_cells_of_the_overlay) {
         transformed(kGeocentric, kGeographic3d, geocentric_of(GetParam().datum, p_map_m));
     const double across = (place.x() - border("west")) / (border("east") - border("west"));
     const double down = (border("north") - place.y()) / (border("north") - border("south"));
+    ASSERT_TRUE(across >= 0.0 && across < 1.0 && down >= 0.0 && down < 1.0);
     const auto cell = static_cast<std::size_t>(down * rows) * static_cast<std::size_t>(columns) +
                       static_cast<std::size_t>(across * columns);
     ASSERT_LT(cell, alpha.size());
