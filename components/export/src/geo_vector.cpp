@@ -2,10 +2,13 @@
 // Copyright the Trigpoint developers
 #include "gdal_errors.hpp"
 #include "geo_files.hpp"
+#include "part_file.hpp"
+#include <cpl_vsi.h>
 #include <gdal_priv.h>
 #include <ogrsf_frmts.h>
 
 #include <ctime>
+#include <filesystem>
 #include <memory>
 
 namespace trigpoint::exporter {
@@ -56,22 +59,51 @@ void add_field(OGRLayer& layer, const char* name, OGRFieldType type) {
   layer.CreateField(&field);
 }
 
-void close(Dataset dataset, GdalTarget& target, const std::string& file) {
-  dataset.reset();
-  GdalErrors::check(true, file, "write");
-  target.commit();
-}
+/// A file in memory, since GDAL's drivers for texts do not notice a full disk. Trajectories are
+/// small.
+class MemoryFile {
+ public:
+  MemoryFile(const char* driver_name, const std::string& file)
+      : file_(file),
+        path_("/vsimem/trigpoint/" + std::filesystem::path(file).filename().string()),
+        dataset_(create(driver_name, path_)) {}
+
+  ~MemoryFile() {
+    dataset_.reset();
+    VSIUnlink(path_.c_str());
+  }
+
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+
+  GDALDataset& dataset() { return *dataset_; }
+
+  void save() {
+    dataset_.reset();
+    vsi_l_offset size = 0;
+    const auto* bytes =
+        reinterpret_cast<const char*>(VSIGetMemFileBuffer(path_.c_str(), &size, FALSE));
+    GdalErrors::check(bytes != nullptr, file_, "write");
+    PartFile part(file_, "");
+    part.append(bytes, size);
+    part.finish("");
+  }
+
+ private:
+  std::string file_;
+  std::string path_;
+  Dataset dataset_;
+};
 
 }  // namespace
 
 void write_geojson(const std::string& file, const std::vector<Track>& tracks) {
   const GdalErrors errors;
-  GdalTarget target(file);
-  Dataset dataset = create("GeoJSON", target.part());
+  MemoryFile memory("GeoJSON", file);
   OGRSpatialReference reference = wgs84();
   // 1e-9 degree is a tenth of a millimetre.
   const char* options[] = {"COORDINATE_PRECISION=9", nullptr};
-  OGRLayer* layer = dataset->CreateLayer(
+  OGRLayer* layer = memory.dataset().CreateLayer(
       "trajectories", &reference, wkbLineString25D, const_cast<char**>(options));
   GdalErrors::check(layer != nullptr, file, "create");
   add_field(*layer, "name", OFTString);
@@ -91,15 +123,14 @@ void write_geojson(const std::string& file, const std::vector<Track>& tracks) {
     feature->SetGeometry(&line);
     GdalErrors::check(layer->CreateFeature(feature.get()) == OGRERR_NONE, file, "write");
   }
-  close(std::move(dataset), target, file);
+  memory.save();
 }
 
 void write_gpx(const std::string& file, const std::vector<Track>& tracks) {
   const GdalErrors errors;
-  GdalTarget target(file);
-  Dataset dataset = create("GPX", target.part());
+  MemoryFile memory("GPX", file);
   OGRSpatialReference reference = wgs84();
-  OGRLayer* layer = dataset->CreateLayer("track_points", &reference, wkbPoint25D, nullptr);
+  OGRLayer* layer = memory.dataset().CreateLayer("track_points", &reference, wkbPoint25D, nullptr);
   GdalErrors::check(layer != nullptr, file, "create");
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     bool first = true;
@@ -118,7 +149,7 @@ void write_gpx(const std::string& file, const std::vector<Track>& tracks) {
       GdalErrors::check(layer->CreateFeature(feature.get()) == OGRERR_NONE, file, "write");
     }
   }
-  close(std::move(dataset), target, file);
+  memory.save();
 }
 
 }  // namespace trigpoint::exporter

@@ -11,7 +11,12 @@ namespace trigpoint::exporter {
 
 PartFile::PartFile(const std::string& file, const std::string& head)
     : file_(file), part_(file + ".part") {
-  write(std::ios::binary | std::ios::trunc, head.data(), head.size());
+  try {
+    write(std::ios::binary | std::ios::trunc, head.data(), head.size());
+  } catch (...) {
+    std::remove(part_.c_str());  // no destructor will
+    throw;
+  }
 }
 
 PartFile::~PartFile() {

@@ -8,6 +8,10 @@
 #include "scratch_folder.hpp"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <cmath>
+#include <csignal>
 
 namespace trigpoint::exporter {
 namespace {
@@ -193,6 +197,57 @@ TEST_F(ExportSession, keeps_a_map_on_the_antimeridian_in_one_piece) {
   export_session(session(), out(), {{"kml"}});
   const std::string kml = read_all(out("session.kml"));
   EXPECT_THAT(kml, AllOf(HasSubstr("<east>180.0001"), HasSubstr("<west>179.9998")));
+}
+
+/// While it lives no file of this process grows beyond `bytes`: as on a disk that fills up.
+class SmallDisk {
+ public:
+  explicit SmallDisk(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    ::getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit limit{bytes, before_.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+  }
+
+  ~SmallDisk() {
+    ::setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+
+  SmallDisk(const SmallDisk&) = delete;
+  SmallDisk& operator=(const SmallDisk&) = delete;
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int);
+};
+
+TEST_F(ExportSession, names_the_file_that_the_disk_had_no_room_for_and_leaves_no_part_of_it) {
+  PointCloud cloud;
+  for (int i = 0; i < 20'000; ++i) {
+    const auto x = static_cast<float>(i);
+    cloud.push_back(
+        {20.0F * std::sin(0.7F * x), 20.0F * std::cos(1.3F * x), 9.0F * std::sin(x), x});
+  }
+  write_pcd(path_in(session(), session_file::kMap), cloud);
+  std::string pcd = read_all(path_in(session(), session_file::kMap));
+  pcd.replace(pcd.find("VERSION"), 0, "# frame map\n");
+  write_all(path_in(session(), session_file::kMap), pcd);
+  write_datum(path_in(session(), session_file::kDatum), {43.9, -78.9, 100.0});
+  {
+    TrajectoryWriter fused(path_in(session(), session_file::kFused), "base_link in map");
+    for (int i = 0; i < 2000; ++i) {
+      fused.append(i * 100'000'000LL, Pose(Eigen::Quaterniond::Identity(), {0.1 * i, 0.0, 0.0}));
+    }
+  }
+  for (const char* format : {"ply", "las", "kitti", "csv", "geojson", "gpx", "kml", "geotiff"}) {
+    std::string error;
+    {
+      const SmallDisk disk(8192);
+      error = error_of([&] { export_session(session(), out(format), {{format}}); });
+    }
+    EXPECT_THAT(error, AllOf(HasSubstr(out(format)), HasSubstr("cannot"))) << format;
+    EXPECT_TRUE(std::filesystem::is_empty(out(format))) << format << ": " << error;
+  }
 }
 
 TEST_F(ExportSession, places_lio_once_so_that_its_drift_shows) {
