@@ -2,7 +2,7 @@
 // Copyright the Trigpoint developers
 #include "trigpoint/export/map.hpp"
 
-#include "line_file.hpp"
+#include "pcd_head.hpp"
 #include "pcd_writer.hpp"
 #include <pcl/PCLPointCloud2.h>
 #include <pcl/io/pcd_io.h>
@@ -34,29 +34,25 @@ float float_at(const std::uint8_t* point, int offset) {
   return value;
 }
 
-/// Where a point has what.
-class PointLayout {
- public:
-  PointLayout(const pcl::PCLPointCloud2& cloud, const std::string& file)
-      : x_(offset_of(cloud, "x")),
-        y_(offset_of(cloud, "y")),
-        z_(offset_of(cloud, "z")),
-        intensity_(offset_of(cloud, "intensity")) {
-    if (x_ < 0 || y_ < 0 || z_ < 0) {
+/// Byte offsets of a point's float32 fields; -1: there is none.
+struct PointLayout {
+  int x{-1};
+  int y{-1};
+  int z{-1};
+  int intensity{-1};
+
+  /// `offset_of` gives the offset of a field by its name.
+  template <typename OffsetOf>
+  PointLayout(const std::string& file, const OffsetOf& offset_of)
+      : x(offset_of("x")), y(offset_of("y")), z(offset_of("z")), intensity(offset_of("intensity")) {
+    if (x < 0 || y < 0 || z < 0) {
       throw std::runtime_error(file + ": has no x, y and z of type float32");
     }
   }
 
   PointXyzi point_at(const std::uint8_t* point) const {
-    return {
-        float_at(point, x_), float_at(point, y_), float_at(point, z_), float_at(point, intensity_)};
+    return {float_at(point, x), float_at(point, y), float_at(point, z), float_at(point, intensity)};
   }
-
- private:
-  int x_;
-  int y_;
-  int z_;
-  int intensity_;
 };
 
 void require(const std::string& file) {
@@ -65,8 +61,6 @@ void require(const std::string& file) {
   }
 }
 
-/// PCL's number for "DATA binary".
-constexpr int kBinary = 1;
 /// 1 MB of a map.
 constexpr std::size_t kPointsAtOnce = 65536;
 
@@ -95,7 +89,7 @@ PointCloud read_pcd(const std::string& file) {
   if (pcl::PCDReader().read(file, raw) != 0) {
     throw std::runtime_error(file + ": not a readable PCD file");
   }
-  const PointLayout layout(raw, file);
+  const PointLayout layout(file, [&](const char* name) { return offset_of(raw, name); });
   PointCloud cloud;
   for (std::size_t at = 0; at + raw.point_step <= raw.data.size(); at += raw.point_step) {
     cloud.push_back(layout.point_at(raw.data.data() + at));
@@ -106,37 +100,28 @@ PointCloud read_pcd(const std::string& file) {
 void visit_pcd(const std::string& file,
                const std::function<void(const PointCloud& points, double share)>& visit) {
   require(file);
-  pcl::PCLPointCloud2 head;
-  Eigen::Vector4f origin;
-  Eigen::Quaternionf orientation;
-  int version = 0;
-  int storage = 0;
-  unsigned int data_begin = 0;
-  if (pcl::PCDReader().readHeader(file, head, origin, orientation, version, storage, data_begin) !=
-      0) {
-    throw std::runtime_error(file + ": not a readable PCD file");
-  }
-  if (storage != kBinary) {
+  const PcdHead head = read_pcd_head(file);
+  if (head.storage != "binary") {
     PointCloud cloud = read_pcd(file);
     std::erase_if(cloud, [](const PointXyzi& point) { return !point.position().allFinite(); });
     visit(cloud, 1.0);
     return;
   }
-  const PointLayout layout(head, file);
-  const std::size_t points = static_cast<std::size_t>(head.width) * head.height;
+  const PointLayout layout(file, [&](const char* name) { return head.offset_of(name); });
+  const std::size_t points = head.points;
   std::ifstream in(file, std::ios::binary);
-  in.seekg(data_begin);
+  in.seekg(static_cast<std::streamoff>(head.data_begin));
   std::vector<char> bytes;
   for (std::size_t done = 0; done < points;) {
     const std::size_t count = std::min(kPointsAtOnce, points - done);
-    bytes.resize(count * head.point_step);
+    bytes.resize(count * head.point_bytes);
     if (!in.read(bytes.data(), static_cast<std::streamsize>(bytes.size()))) {
       throw std::runtime_error(file + ": ends after " + std::to_string(done) + " of " +
                                std::to_string(points) + " points");
     }
     PointCloud cloud;
     for (std::size_t i = 0; i < count; ++i) {
-      const auto* at = reinterpret_cast<const std::uint8_t*>(bytes.data() + i * head.point_step);
+      const auto* at = reinterpret_cast<const std::uint8_t*>(bytes.data() + i * head.point_bytes);
       const PointXyzi point = layout.point_at(at);
       if (point.position().allFinite()) {
         cloud.push_back(point);

@@ -65,6 +65,39 @@ TEST(Pcd, is_visited_in_parts_as_it_is_read_whole) {
   EXPECT_EQ(last_share, 1.0);
 }
 
+TEST(Pcd, of_other_fields_and_storages_is_visited_as_pcl_reads_it) {
+  const ScratchFolder folder;
+  const std::string fields =
+      "# .PCD v0.7\nVERSION 0.7\nFIELDS rgb normal x y z intensity\nSIZE 2 4 4 4 4 4\n"
+      "TYPE U F F F F F\nCOUNT 1 3 1 1 1 1\nWIDTH 1\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 1\n";
+  std::string point(2 + 3 * 4, '\7');
+  for (const float value : {1.5F, 2.5F, 3.5F, 4.5F}) {
+    point.append(reinterpret_cast<const char*>(&value), sizeof(value));
+  }
+  write_all(folder.file("binary.pcd"), fields + "DATA binary\n" + point);
+  write_all(folder.file("ascii.pcd"), fields + "DATA ascii\n7 0 0 0 1.5 2.5 3.5 4.5\n");
+  for (const char* name : {"binary.pcd", "ascii.pcd"}) {
+    PointCloud visited;
+    visit_pcd(folder.file(name), [&](const PointCloud& points, double) { visited = points; });
+    const PointCloud read = read_pcd(folder.file(name));
+    ASSERT_EQ(visited.size(), 1U) << name;
+    ASSERT_EQ(read.size(), 1U) << name;
+    EXPECT_EQ(visited[0].position(), Eigen::Vector3f(1.5F, 2.5F, 3.5F)) << name;
+    EXPECT_EQ(visited[0].position(), read[0].position()) << name;
+    EXPECT_EQ(visited[0].intensity, 4.5F) << name;
+  }
+}
+
+TEST(Pcd, that_is_none_is_named) {
+  const ScratchFolder folder;
+  write_all(folder.file("text.pcd"), "this is no cloud\n");
+  write_all(folder.file("cut.pcd"), "VERSION 0.7\nFIELDS x y z\nSIZE 4 4\n");
+  for (const char* name : {"text.pcd", "cut.pcd"}) {
+    EXPECT_THAT(error_of([&] { visit_pcd(folder.file(name), [](const auto&, double) {}); }),
+                testing::AllOf(HasSubstr(name), HasSubstr("not a readable PCD")));
+  }
+}
+
 TEST(Pcd, that_ends_too_early_is_an_error_with_the_numbers) {
   const ScratchFolder folder;
   write_pcd(folder.file("a.pcd"), PointCloud(10));
