@@ -443,6 +443,28 @@ TEST(Command, evaluate_tells_a_known_offset) {
   EXPECT_THAT(again.output, HasSubstr("is there already"));
 }
 
+TEST(Command, a_mapped_drive_is_exported_and_scored_against_its_world) {
+  const TemporaryFolder folder;
+  const std::string session = folder.path("s");
+  ASSERT_EQ(trigpoint({"map", "short", "--duration", "12", "--out", session}).exit_code, 0);
+  const CommandResult exported = trigpoint({"export", session});
+  EXPECT_EQ(exported.exit_code, 0) << exported.output;
+  for (const char* file : {"map.las", "map.ply", "session.kmz", "height.tif", "trajectories.gpx"}) {
+    EXPECT_GT(fs::file_size(session + "/export/" + file), 1000U) << file;
+  }
+  const CommandResult scored = trigpoint({"evaluate", session, "--map", "--scenario", "short"});
+  ASSERT_EQ(scored.exit_code, 0) << scored.output;
+  const std::string key = "Distance to the true surfaces: rmse ";
+  const auto at = scored.output.find(key);
+  ASSERT_NE(at, std::string::npos) << scored.output;
+  constexpr double kGoodMap_m = 0.05;  // range noise 0.02 m, pose errors, cells of 0.1 m
+  EXPECT_LT(std::stod(scored.output.substr(at + key.size())), kGoodMap_m);
+  // In another world most walls are elsewhere.
+  const CommandResult other =
+      trigpoint({"evaluate", session, "--map", "--scenario", "short", "--seed", "2"});
+  EXPECT_GT(std::stod(other.output.substr(other.output.find(key) + key.size())), kGoodMap_m);
+}
+
 TEST(Command, record_hears_what_play_says) {
   const TemporaryFolder folder;
   const std::map<std::string, std::string> environment{{"ROS_DOMAIN_ID", tests::own_domain(50)}};

@@ -69,6 +69,8 @@ std::vector<std::string> read_lines(const std::string& file);
 /// The whole text as a number; false when it is not one.
 bool parse_number(const std::string& text, double& value);
 bool parse_integer(const std::string& text, std::int64_t& value);
+/// "12.5" (seconds) to 12500000000 without going through a double, which cannot hold 19 digits.
+bool parse_stamp(const std::string& text, Nanoseconds& stamp_ns);
 
 /// Shortest text that reads back to the same bits.
 std::string number_text(double value);

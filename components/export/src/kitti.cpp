@@ -4,7 +4,6 @@
 #include "trigpoint/export/trajectory_formats.hpp"
 
 #include "csv.hpp"
-#include "line_file.hpp"
 #include <Eigen/LU>
 
 #include <array>
@@ -70,20 +69,12 @@ Pose pose_of(const Line& line) {
 }
 
 Nanoseconds stamp_of(const Line& line) {
-  // As a decimal text, since stamps of today have more digits than a double.
-  const std::string& text = line.words.front();
-  const auto dot = text.find('.');
-  std::string digits = text.substr(0, dot) + (dot == std::string::npos ? "" : text.substr(dot + 1));
-  const std::size_t decimals = dot == std::string::npos ? 0 : text.size() - dot - 1;
   Nanoseconds stamp_ns = 0;
-  if (decimals <= 9) {
-    digits += std::string(9 - decimals, '0');
-    if (text.find_first_not_of("0123456789.") == std::string::npos &&
-        parse_integer(digits, stamp_ns)) {
-      return stamp_ns;
-    }
+  if (!parse_stamp(line.words.front(), stamp_ns)) {
+    throw std::runtime_error(line.place + ": '" + line.words.front() +
+                             "' is not a time in seconds");
   }
-  return from_seconds(number_of(line, 0));  // KITTI's own: 1.037584e-01
+  return stamp_ns;
 }
 
 }  // namespace

@@ -19,33 +19,6 @@ constexpr std::size_t kFractionDigits = 9;
 /// Half a unit of the sixth decimal in each of four components, with room for foreign files.
 constexpr double kNormTolerance = 1e-3;
 
-/// "12.5" to 12500000000 without going through a double, which cannot hold 19 digits.
-bool parse_stamp(const std::string& text, Nanoseconds& stamp_ns) {
-  if (text.find_first_of("eE") != std::string::npos) {
-    double seconds = 0.0;
-    if (!parse_number(text, seconds) || !(std::abs(seconds) < 9e9)) {
-      return false;
-    }
-    stamp_ns = from_seconds(seconds);
-    return true;
-  }
-  const bool negative = text.starts_with('-');
-  const std::string digits = negative ? text.substr(1) : text;
-  const auto dot = digits.find('.');
-  std::string fraction = dot == std::string::npos ? "" : digits.substr(dot + 1);
-  if (fraction.find_first_not_of("0123456789") != std::string::npos) {
-    return false;
-  }
-  fraction.resize(kFractionDigits, '0');
-  const std::string whole = digits.substr(0, dot);
-  if (whole.empty() || whole.find_first_not_of("0123456789") != std::string::npos) {
-    return false;
-  }
-  const bool parsed = parse_integer(whole + fraction, stamp_ns);
-  stamp_ns = negative ? -stamp_ns : stamp_ns;
-  return parsed;
-}
-
 [[noreturn]] void fail(const std::string& place, const std::string& what) {
   throw std::runtime_error(place + ": " + what);
 }
@@ -80,6 +53,32 @@ StampedPose parse_pose(const std::string& place, const std::string& line) {
 }
 
 }  // namespace
+
+bool parse_stamp(const std::string& text, Nanoseconds& stamp_ns) {
+  if (text.find_first_of("eE") != std::string::npos) {
+    double seconds = 0.0;
+    if (!parse_number(text, seconds) || !(std::abs(seconds) < 9e9)) {
+      return false;
+    }
+    stamp_ns = from_seconds(seconds);
+    return true;
+  }
+  const bool negative = text.starts_with('-');
+  const std::string digits = negative ? text.substr(1) : text;
+  const auto dot = digits.find('.');
+  std::string fraction = dot == std::string::npos ? "" : digits.substr(dot + 1);
+  if (fraction.find_first_not_of("0123456789") != std::string::npos) {
+    return false;
+  }
+  fraction.resize(kFractionDigits, '0');
+  const std::string whole = digits.substr(0, dot);
+  if (whole.empty() || whole.find_first_not_of("0123456789") != std::string::npos) {
+    return false;
+  }
+  const bool parsed = parse_integer(whole + fraction, stamp_ns);
+  stamp_ns = negative ? -stamp_ns : stamp_ns;
+  return parsed;
+}
 
 std::string stamp_text(Nanoseconds stamp_ns) {
   const bool negative = stamp_ns < 0;
