@@ -82,7 +82,7 @@ class Pairs:
     def __init__(self, stamps, e, Re, r, Rr):
         self.stamps, self.e, self.Re, self.r, self.Rr = stamps, np.array(e), np.array(Re), np.array(r), np.array(Rr)
 
-    def aligned(self, kind):
+    def alignment(self, kind):
         e, r = self.e - self.e.mean(0), self.r - self.r.mean(0)
         if kind == 0:
             R, t = np.eye(3), np.zeros(3)
@@ -95,6 +95,10 @@ class Pairs:
             R = Vt.T @ np.diag([1, 1, np.sign(np.linalg.det(Vt.T @ U.T))]) @ U.T
         if kind:
             t = self.r.mean(0) - R @ self.e.mean(0)
+        return R, t
+
+    def aligned(self, kind):
+        R, t = self.alignment(kind)
         return Pairs(self.stamps, self.e @ R.T + t, R @ self.Re, self.r, self.Rr)
 
 
@@ -195,10 +199,20 @@ def outage(pairs, window):
             "end_m": far[-1] if inside else None, "distance_m": way}
 
 
+def score_of(said, pairs, has_attitude):
+    if said["error"] is None:
+        return {"error": None}
+    kind = NAMES[said["alignment"]]
+    R, t = pairs.alignment(kind)
+    # Two quaternions mean one rotation: the angle between it and what was said is compared with 0.
+    turned = angle(R.T @ matrix(*said["quaternion_xyzw"]))
+    said["turned_rad"] = turned
+    return {"error": absolute(pairs.aligned(kind), has_attitude), "translation_m": t.tolist(), "turned_rad": 0.0}
+
+
 def expected_of(said, trajectory, lio, pairs, coverage, has_attitude):
     result = {"pairs": len(pairs.stamps), "coverage_from_first": coverage[0], "coverage_whole": coverage[1]}
-    result["scores"] = [{"error": None if score.get("error") is None else
-                         absolute(pairs.aligned(NAMES[score["alignment"]]), has_attitude)} for score in said["scores"]]
+    result["scores"] = [score_of(score, pairs, has_attitude) for score in said["scores"]]
     way = pairs if has_attitude else pairs.aligned(1)
     result["relative"] = [relative(way, length, has_attitude) for length in (10.0, 50.0, 100.0)]
     if has_attitude:
