@@ -3,7 +3,9 @@
 #include "trigpoint/base/config.hpp"
 #include "trigpoint/export/export_session.hpp"
 #include "trigpoint/export/session.hpp"
+#include "trigpoint/shell/stop_signal.hpp"
 
+#include "interruption.hpp"
 #include "number_checks.hpp"
 #include "progress.hpp"
 #include "verbs.hpp"
@@ -37,6 +39,9 @@ void require_session(const std::string& folder) {
                     "lio.tum, gps.tum is in it); trigpoint map and bringup/run leave one");
 }
 
+/// Thrown out of the export: files that are not whole go on the way.
+struct Interrupted {};
+
 /// What was asked for by name and could not be written is a failure; what "all" cannot do is not.
 int run(const ExportVerbOptions& options) {
   require_session(options.session);
@@ -44,10 +49,18 @@ int run(const ExportVerbOptions& options) {
                               ? (std::filesystem::path(options.session) / "export").string()
                               : options.out;
   exporter::ExportReport report;
-  {
+  try {
+    const shell::StopSignal stop;
     Progress progress("exporting");
-    report = exporter::export_session(
-        options.session, out, options.what, [&](double share) { progress(share); });
+    report = exporter::export_session(options.session, out, options.what, [&](double share) {
+      if (stop.requested()) {
+        throw Interrupted();
+      }
+      progress(share);
+    });
+  } catch (const Interrupted&) {
+    std::cerr << "trigpoint export: interrupted; what is in " << out << " is whole\n";
+    return kInterrupted;
   }
   for (const exporter::ExportedFile& file : report.written) {
     std::cout << file.file << "  " << file.content << "\n";

@@ -41,6 +41,20 @@ class CloudOutputs {
     }
   }
 
+  /// Folders of tiles that were not finished are empty by then, and go too.
+  ~CloudOutputs() {
+    for (Output& output : outputs_) {
+      output.cloud.reset();
+      if (output.tiles != nullptr) {
+        std::error_code not_empty;
+        std::filesystem::remove(output.path, not_empty);
+      }
+    }
+  }
+
+  CloudOutputs(const CloudOutputs&) = delete;
+  CloudOutputs& operator=(const CloudOutputs&) = delete;
+
   bool wants_utm() const {
     return std::any_of(outputs_.begin(), outputs_.end(), [](const auto& o) { return o.in_utm; });
   }

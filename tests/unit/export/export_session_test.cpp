@@ -178,6 +178,21 @@ TEST_F(ExportSession, leaves_no_hidden_file_and_writes_tiles_of_the_same_points)
   EXPECT_EQ(read_pcd(out("map_pcd/map_0_0.pcd")).size(), 1U);
 }
 
+TEST_F(ExportSession, that_is_broken_off_leaves_nothing_and_can_be_repeated) {
+  write_keyframe();
+  write_alignment(path_in(session(), session_file::kAlignment), {});
+  write_datum(path_in(session(), session_file::kDatum), {43.9, -78.9, 100.0});
+  const ExportOptions options{{"ply", "las"}, 0.1, 20.0};
+  const auto break_off = [](double share) {
+    if (share > 0.85) {  // while the tiles are written
+      throw std::runtime_error("stop");
+    }
+  };
+  EXPECT_EQ(error_of([&] { export_session(session(), out(), options, break_off); }), "stop");
+  EXPECT_TRUE(std::filesystem::is_empty(out()));
+  EXPECT_EQ(export_session(session(), out(), options).written.size(), 3U);
+}
+
 TEST_F(ExportSession, refuses_tiles_whose_names_would_be_the_same) {
   write_keyframe();
   EXPECT_THAT(error_of([&] {
