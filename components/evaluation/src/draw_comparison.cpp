@@ -133,7 +133,8 @@ std::string draw_top_view(const ComparisonBlock& block,
   const Picture picture(exporter::path_in(folder, "plots"), name);
   std::ostringstream body;
   body << "set title 'Top view, alignment: " << name_of(AlignmentKind::kYawTranslation)
-       << "' noenhanced\nset xlabel 'x (E) [m]' offset 0,0.6\nset ylabel 'y (N) [m]'\nset size ratio -1\n"
+       << "' noenhanced\nset xlabel 'x (E) [m]' offset 0,0.6\nset ylabel 'y (N) [m]'\nset size "
+          "ratio -1\n"
        << "set grid lc rgb '#cccccc'\nset tics out nomirror\n"
        << "set key outside below center horizontal noenhanced\nplot ";
   const auto longest =
