@@ -58,12 +58,14 @@ std::vector<PosePair> thinned(const std::vector<PosePair>& pairs) {
 /// The first one is drawn last, over the others: it is the one that is published.
 std::vector<Curve> curves_of(const ComparisonBlock& block, AlignmentKind kind) {
   std::vector<Curve> curves;
+  std::size_t estimate = 0;
   for (const Compared& compared : block.compared) {
+    // The same colour in every picture, also where another one is left out.
+    const char* colour = kColours[estimate++ % kColours.size()];
     if (kind == AlignmentKind::kNone && !compared.is_in_reference_frame) {
       continue;
     }
     if (const auto T = align(compared.pairs, kind)) {
-      const char* colour = kColours[curves.size() % kColours.size()];
       curves.push_back({title_of(compared.evaluation.estimate_name),
                         std::string(" lw 1.8 lc rgb '") + colour + "'",
                         place_estimates(*T, thinned(compared.pairs))});

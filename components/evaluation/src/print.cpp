@@ -63,9 +63,11 @@ std::string print_outages(const Evaluation& evaluation) {
   }
   for (const auto& outage : evaluation.outages) {
     text += "Outage of " + fixed(to_seconds(outage.window.end_ns - outage.window.begin_ns), 1) +
-            " s from " + exporter::stamp_text(outage.window.begin_ns) + ": error at begin " +
-            fixed(outage.begin_m, 3) + " m, max " + fixed(outage.max_m, 3) + " m, at end " +
-            fixed(outage.end_m, 3) + " m, no alignment\n";
+            " s from " + exporter::stamp_text(outage.window.begin_ns) + ": ";
+    text += outage.pairs == 0 ? "nothing of the reference lies inside\n"
+                              : "error at begin " + fixed(outage.begin_m, 3) + " m, max " +
+                                    fixed(outage.max_m, 3) + " m, at end " +
+                                    fixed(outage.end_m, 3) + " m, no alignment\n";
   }
   return text;
 }
