@@ -95,6 +95,11 @@ std::string peers(const Config& config) {
 }
 
 std::string discovery(const Config& config) {
+  if (!config.discovery_server.empty()) {
+    throw std::runtime_error(
+        "bus.discovery_server is '" + config.discovery_server +
+        "', and Cyclone DDS knows no discovery server; name the computers in bus.initial_peers");
+  }
   return element("Discovery",
                  // Each participant has a Cyclone domain of its own (see CycloneNode).
                  element("ExternalDomainId", domain_of(config)) +
@@ -112,8 +117,9 @@ std::string buffer(const std::string& name, std::int64_t bytes) {
 
 std::string internal(const Config& config, const SocketBuffers& buffers) {
   const std::string heartbeat = milliseconds(config.heartbeat_s);
+  const auto pacing = pacing_of(config, buffers);
   const std::string repair_burst =
-      element("BurstSize", element("MaxRexmit", paced_portion_bytes(buffers), "B"));
+      pacing ? element("BurstSize", element("MaxRexmit", pacing->portion_bytes, "B")) : "";
   return element("Internal",
                  buffer("SocketReceiveBufferSize", buffers.receive_bytes) +
                      buffer("SocketSendBufferSize", buffers.send_bytes) +
@@ -123,8 +129,7 @@ std::string internal(const Config& config, const SocketBuffers& buffers) {
                      element("WriterLingerDuration", kLinger.count(), "ms") +
                      element("MaxSampleSize", kLargestMessage_bytes, "B") +
                      element("DefragReliableMaxSamples", kMostIncomplete) +
-                     element("DefragUnreliableMaxSamples", kMostIncomplete) +
-                     (is_small(buffers) ? repair_burst : ""));
+                     element("DefragUnreliableMaxSamples", kMostIncomplete) + repair_burst);
 }
 
 }  // namespace
