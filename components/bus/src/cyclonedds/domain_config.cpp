@@ -18,7 +18,10 @@ constexpr std::size_t kMostInterfaces = 4;  // Cyclone 0.10 cannot use more
 constexpr int kHighestIndex = 119;   // of a participant: above, ports belong to the next domain
 constexpr int kFirstIndexPort = 10;  // discovery of participant 0, above the domain's first
 constexpr std::int64_t kHeaders_bytes = 128;  // of RTPS in front of a fragment, generously
-constexpr int kMostIncomplete = 2;  // samples of a writer, each of up to the largest message
+// Samples of a writer of which fragments are missing. When there are more, fragments of the newest
+// are thrown away, and a lossy link never catches up (with 2: 5 of 120 clouds at 1 % and 50 ms).
+constexpr int kMostRepaired = 16;
+constexpr int kMostIncomplete = 2;  // of best effort: the rest never comes
 constexpr std::int64_t kLargestFragment_bytes = 64'000;
 
 std::string element(const std::string& name, const std::string& content) {
@@ -128,7 +131,7 @@ std::string internal(const Config& config, const SocketBuffers& buffers) {
                      element("AutoReschedNackDelay", heartbeat) +
                      element("WriterLingerDuration", kLinger.count(), "ms") +
                      element("MaxSampleSize", kLargestMessage_bytes, "B") +
-                     element("DefragReliableMaxSamples", kMostIncomplete) +
+                     element("DefragReliableMaxSamples", kMostRepaired) +
                      element("DefragUnreliableMaxSamples", kMostIncomplete) + repair_burst);
 }
 

@@ -3,6 +3,7 @@
 #include "transport.hpp"
 
 #include "../network.hpp"
+#include "limited_transport.hpp"
 #include <fastdds/rtps/flowcontrol/FlowControllerDescriptor.hpp>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastrtps/utils/IPLocator.h>
@@ -29,6 +30,7 @@ struct Udp : UDPv4TransportDescriptor {
 /// Of a server that was started as number 0: `fastdds discovery -i 0`.
 constexpr char kDiscoveryServerPrefix[] = "44.53.00.5f.45.50.52.4f.53.49.4d.41";
 constexpr int kDiscoveryServerPort = 11811;
+constexpr char kLoopback[] = "127.0.0.1";
 
 Locator_t peer_locator(const std::string& text) {
   const Peer peer = parse_peer(text);
@@ -95,11 +97,14 @@ void set_transport(eprosima::fastdds::dds::DomainParticipantQos& qos,
   udp->maxInitialPeersRange = kProcessesPerPeer;
   if (!config.network_interface.empty()) {
     udp->interfaceWhiteList.push_back(find_interface(config.network_interface).address);
+    // Fast DDS participants without this restriction, such as a discovery server, answer those on
+    // their own computer there.
+    udp->interfaceWhiteList.push_back(kLoopback);
   }
   // Shared memory stays off: it costs seconds of reconnection after a kill and never matches
   // between root and other users (see the README).
   qos.transport().use_builtin_transports = false;
-  qos.transport().user_transports.push_back(udp);
+  qos.transport().user_transports.push_back(limited(udp));
   auto& discovery = qos.wire_protocol().builtin.discovery_config;
   discovery.leaseDuration = eprosima::fastrtps::Duration_t(config.lease_s);
   discovery.leaseDuration_announcementperiod = eprosima::fastrtps::Duration_t(config.lease_s / 4.0);
