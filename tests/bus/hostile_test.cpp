@@ -39,6 +39,9 @@ using Bytes = std::vector<std::uint8_t>;
 /// Resident; an idle mapper has about 40 MB.
 constexpr std::uint64_t kMostMemory_kb = 200'000;
 
+/// So that a mapper that falls for it ends, and not the computer.
+constexpr char kAddressSpace[] = "--as=4000000000";
+
 /// The mapper of the backend that this test is linked with.
 std::string mapper_program() {
   const std::string bin = TRIGPOINT_BIN_DIR;
@@ -52,8 +55,8 @@ class Hostile : public ::testing::Test {
     tests::write_file(folder_.path("bus.yaml"),
                       "bus: {domain_id: " + std::to_string(own_domain().domain_id) +
                           ", network_interface: lo}\n");
-    mapper_.emplace(
-        std::vector<std::string>{mapper_program(), "--config", folder_.path("bus.yaml")});
+    mapper_.emplace(std::vector<std::string>{
+        "prlimit", kAddressSpace, mapper_program(), "--config", folder_.path("bus.yaml")});
   }
 
   /// kB that the mapper has used at most.

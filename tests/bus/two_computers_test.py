@@ -54,7 +54,7 @@ def run_hosts(link, build, folder):
     host = [os.path.join(ROOT, "bringup", "host")]
     common = ["--no-build", "--peers", ",".join(HOSTS)]
     with open(os.path.join(folder, "robot.log"), "w", encoding="utf-8") as robot_log, open(os.path.join(folder, "base.log"), "w", encoding="utf-8") as base_log:
-        base = link.start(1, host + ["base", "--out", os.path.join(folder, "base")] + common + other_vendor, base_log, shifted)
+        base = link.start(1, host + ["base", "--out", os.path.join(folder, "base"), "--for", "short"] + common + other_vendor, base_log, shifted)
         robot = link.start(0, host + ["robot", "--out", os.path.join(folder, "robot"), "--play", "short"] + common, robot_log, environment)
         try:
             code = robot.wait(120)

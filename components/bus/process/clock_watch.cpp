@@ -21,6 +21,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iomanip>
 #include <map>
 #include <optional>
 #include <set>
@@ -166,8 +167,8 @@ class Process {
                                {{"offset_s", std::to_string(to_seconds(clock.offset_ns))},
                                 {"round_trip_s", std::to_string(to_seconds(clock.round_trip_ns))}}};
     diagnostics_.publish(bus::to_message(wall_clock_ns(), {&line, 1}));
-    file_ << wall_clock_ns() << "," << computer << "," << to_seconds(clock.offset_ns) << ","
-          << to_seconds(clock.round_trip_ns) << "\n";
+    file_ << std::fixed << std::setprecision(6) << wall_clock_ns() << "," << computer << ","
+          << to_seconds(clock.offset_ns) << "," << to_seconds(clock.round_trip_ns) << "\n";
   }
 
   const std::string name_{own_name()};

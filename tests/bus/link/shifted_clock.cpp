@@ -2,6 +2,8 @@
 // Copyright the Trigpoint developers
 // Preloaded into a program, it shifts the wall clock that this sees by SHIFTED_CLOCK_S seconds: a
 // second computer whose clock is wrong. Time that only runs (CLOCK_MONOTONIC) stays as it is.
+// Waiting until a moment of the wall clock is shifted back, since the kernel knows the true one.
+#include <pthread.h>
 #include <sys/syscall.h>
 #include <sys/time.h>
 #include <unistd.h>
@@ -42,4 +44,16 @@ extern "C" time_t time(time_t* out) noexcept {
     *out = now.tv_sec;
   }
   return now.tv_sec;
+}
+
+extern "C" int pthread_cond_timedwait(pthread_cond_t* condition,
+                                      pthread_mutex_t* mutex,
+                                      const timespec* until) {
+  // Which clock a condition variable was made for cannot be asked; time since boot is far smaller.
+  constexpr time_t kYears = 1'000'000'000;
+  timespec moment = *until;
+  const bool is_wall_clock = moment.tv_sec > kYears;
+  moment.tv_sec -= is_wall_clock ? shift_s() : 0;
+  return pthread_cond_clockwait(
+      condition, mutex, is_wall_clock ? CLOCK_REALTIME : CLOCK_MONOTONIC, &moment);
 }
