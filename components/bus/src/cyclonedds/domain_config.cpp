@@ -22,6 +22,7 @@ constexpr std::int64_t kHeaders_bytes = 128;  // of RTPS in front of a fragment,
 // are thrown away, and a lossy link never catches up (with 2: 5 of 120 clouds at 1 % and 50 ms).
 constexpr int kMostRepaired = 16;
 constexpr int kMostIncomplete = 2;  // of best effort: the rest never comes
+constexpr double kAskedAgain_s = 0.05;  // for what was asked for and has not come
 constexpr std::int64_t kLargestFragment_bytes = 64'000;
 
 std::string element(const std::string& name, const std::string& content) {
@@ -128,7 +129,7 @@ std::string internal(const Config& config, const SocketBuffers& buffers) {
                      buffer("SocketSendBufferSize", buffers.send_bytes) +
                      "<HeartbeatInterval minsched=\"" + heartbeat + "\" max=\"" + heartbeat +
                      "\">" + heartbeat + "</HeartbeatInterval>" + element("NackDelay", "10ms") +
-                     element("AutoReschedNackDelay", heartbeat) +
+                     element("AutoReschedNackDelay", milliseconds(kAskedAgain_s)) +
                      element("WriterLingerDuration", kLinger.count(), "ms") +
                      element("MaxSampleSize", kLargestMessage_bytes, "B") +
                      element("DefragReliableMaxSamples", kMostRepaired) +
