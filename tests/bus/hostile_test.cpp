@@ -198,7 +198,8 @@ Bytes first_fragment(const std::string& guid, std::uint32_t number, std::uint32_
   append<std::uint16_t>(packet, 1);  // one of them
   append<std::uint16_t>(packet, kFragment_bytes);
   append<std::uint32_t>(packet, sample_bytes);
-  packet.resize(packet.size() + kFragment_bytes, 0x55);
+  append_bytes(packet, {0, 1, 0, 0});  // little-endian CDR
+  packet.resize(packet.size() + kFragment_bytes - 4, 0x55);
   return packet;
 }
 
