@@ -107,6 +107,7 @@ int main(int count, char** arguments) {
   Config config = trigpoint::bus::testing::config_of_domain(std::atoi(arguments[1]));
   if (const char* folder = std::getenv("BUS_PEER_SECURITY")) {
     config.security_folder = folder;
+    config.datagram_bytes = 1'472;  // of bringup/profiles/lan.yaml
   }
   if (what == "hear") {
     config.lease_s = 60.0;  // stays matched also when it is stopped

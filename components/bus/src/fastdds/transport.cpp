@@ -8,6 +8,7 @@
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastrtps/utils/IPLocator.h>
 
+#include <algorithm>
 #include <memory>
 
 namespace trigpoint::bus::fastdds {
@@ -85,13 +86,21 @@ void add_pacing(eprosima::fastdds::dds::DomainParticipantQos& qos, const Pacing&
   qos.flow_controllers().push_back(pacing);
 }
 
+/// Fast DDS cannot divide the messages of its handshake, with certificate and permissions: in
+/// smaller datagrams they are not sent, and nobody matches.
+std::int64_t largest_datagram_bytes(const Config& config) {
+  constexpr std::int64_t kHandshake_bytes = 8'192;
+  return config.security_folder.empty() ? config.datagram_bytes
+                                        : std::max(config.datagram_bytes, kHandshake_bytes);
+}
+
 }  // namespace
 
 void set_transport(eprosima::fastdds::dds::DomainParticipantQos& qos,
                    const Config& config,
                    const SocketBuffers& buffers) {
   auto udp = std::make_shared<Udp>();
-  udp->largest_sent_bytes = static_cast<std::uint32_t>(config.datagram_bytes);
+  udp->largest_sent_bytes = static_cast<std::uint32_t>(largest_datagram_bytes(config));
   udp->sendBufferSize = static_cast<std::uint32_t>(buffers.send_bytes);
   udp->receiveBufferSize = static_cast<std::uint32_t>(buffers.receive_bytes);
   udp->maxInitialPeersRange = kProcessesPerPeer;
