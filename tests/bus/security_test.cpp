@@ -34,6 +34,9 @@ constexpr std::size_t kObserved = 150;
 
 constexpr std::chrono::milliseconds kAgain{20};
 
+/// The longest name that the script takes, since it makes handshakes longer.
+constexpr char kBase[] = "base_station_with_a_longest_name";
+
 /// As between computers: what belongs to a handshake is larger.
 constexpr std::int64_t kLanDatagram_bytes = 1'472;
 
@@ -98,7 +101,7 @@ class Security : public ::testing::TestWithParam<std::string> {
     const auto forger = peer(GetParam(), {"fix"}, credentials_of_stranger);
     const auto listener = peer(GetParam(), {"hear", "imu"}, credentials_of_stranger);
 
-    const auto friendly = peer(backend::name(), {"fix"}, credentials("ours", "base"));
+    const auto friendly = peer(backend::name(), {"fix"}, credentials("ours", kBase));
     ASSERT_TRUE(heard.wait_for(1)) << friendly->output_so_far();
     while (heard.size() < kObserved) {
       imu.publish(to_message(samples::imu()));
@@ -118,7 +121,7 @@ class Security : public ::testing::TestWithParam<std::string> {
     const auto made = tests::run_command({TRIGPOINT_SOURCE_DIR "/bringup/make-credentials",
                                           folder_.path(authority),
                                           "robot",
-                                          "base"});
+                                          kBase});
     ASSERT_EQ(made.exit_code, 0) << made.output;
   }
 
@@ -134,8 +137,8 @@ TEST_P(Security, lets_those_with_credentials_hear_each_other) {
       });
   Readers readers;
   Publisher imu(robot, topics::imu, readers.events());
-  const auto writer = peer(GetParam(), {"fix"}, credentials("ours", "base"));
-  const auto reader = peer(GetParam(), {"hear", "imu"}, credentials("ours", "base"));
+  const auto writer = peer(GetParam(), {"fix"}, credentials("ours", kBase));
+  const auto reader = peer(GetParam(), {"hear", "imu"}, credentials("ours", kBase));
   ASSERT_TRUE(heard.wait_for(1)) << writer->output_so_far();
   samples::expect_equal(heard.items().front(), samples::fix());
   ASSERT_TRUE(readers.wait_for(1)) << reader->output_so_far();

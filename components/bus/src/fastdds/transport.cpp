@@ -89,7 +89,7 @@ void add_pacing(eprosima::fastdds::dds::DomainParticipantQos& qos, const Pacing&
 /// Fast DDS cannot divide the messages of its handshake, with certificate and permissions: in
 /// smaller datagrams they are not sent, and nobody matches.
 std::int64_t largest_datagram_bytes(const Config& config) {
-  constexpr std::int64_t kHandshake_bytes = 8'192;
+  constexpr std::int64_t kHandshake_bytes = 5'880;  // four Ethernet frames
   return config.security_folder.empty() ? config.datagram_bytes
                                         : std::max(config.datagram_bytes, kHandshake_bytes);
 }
