@@ -21,7 +21,7 @@ constexpr std::int64_t kHeaders_bytes = 128;  // of RTPS in front of a fragment,
 // Samples of a writer of which fragments are missing. When there are more, fragments of the newest
 // are thrown away, and a lossy link never catches up (with 2: 5 of 120 clouds at 1 % and 50 ms).
 constexpr int kMostRepaired = 16;
-constexpr int kMostIncomplete = 2;  // of best effort: the rest never comes
+constexpr int kMostIncomplete = 2;      // of best effort: the rest never comes
 constexpr double kAskedAgain_s = 0.05;  // for what was asked for and has not come
 constexpr std::int64_t kLargestFragment_bytes = 64'000;
 
