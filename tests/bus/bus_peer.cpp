@@ -4,6 +4,7 @@
 //   bus_peer DOMAIN TOPIC            its example, again and again until it is killed
 //   bus_peer DOMAIN hear TOPIC       hears it until it is killed, and is missed only long after
 //   bus_peer DOMAIN stream BYTES     IMU at 400 Hz beside clouds of so many bytes at 10 Hz
+// BUS_PEER_SECURITY in the environment names the folder of its credentials.
 #include "bus_fixture.hpp"
 #include "matrix_messages.hpp"
 #include <sys/prctl.h>
@@ -104,6 +105,10 @@ int main(int count, char** arguments) {
   }
   const std::string what = arguments[2];
   Config config = trigpoint::bus::testing::config_of_domain(std::atoi(arguments[1]));
+  if (const char* folder = std::getenv("BUS_PEER_SECURITY")) {
+    config.security_folder = folder;
+    config.datagram_bytes = 1'472;  // of bringup/profiles/lan.yaml
+  }
   if (what == "hear") {
     config.lease_s = 60.0;  // stays matched also when it is stopped
   }

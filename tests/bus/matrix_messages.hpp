@@ -53,6 +53,7 @@ void visit_topics(Visitor&& visit) {
   visit("tf", topics::tf, transforms());
   visit("tf_static", topics::tf_static, transforms());
   visit("diagnostics", topics::diagnostics, diagnostics());
+  visit("clock_probe", topics::clock_probe, diagnostics());
 }
 
 // ---- streams ------------------------------------------------------------------------------------

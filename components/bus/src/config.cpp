@@ -45,6 +45,10 @@ void describe(Config& config, ConfigFields& fields) {
                config.initial_peers,
                "computers to look for where there is no multicast: \"10.0.0.2\" or "
                "\"10.0.0.2:7410\"; name this computer too");
+  fields.text("discovery_server",
+              config.discovery_server,
+              "a Fast DDS discovery server through which all processes find each other, "
+              "\"10.0.0.1:11811\"; Cyclone DDS knows none. Empty: multicast and initial_peers");
   fields.integer("socket_buffer_bytes",
                  config.socket_buffer_bytes,
                  "wanted size of each socket buffer; what the kernel does not permit "
@@ -55,6 +59,11 @@ void describe(Config& config, ConfigFields& fields) {
                  "largest datagram sent: 65500 within one computer, 1472 between computers, where "
                  "one lost frame would lose all of a larger one",
                  {1200, 65500});
+  fields.integer("bulk_bytes_per_s",
+                 config.bulk_bytes_per_s,
+                 "most that this process sends of its point clouds, for slow links; their readers "
+                 "on the same computer wait too. 0: no limit",
+                 {0, 10'000'000'000});
   fields.number("heartbeat_s",
                 config.heartbeat_s,
                 "how often a reliable writer asks its readers what they miss",
@@ -63,6 +72,10 @@ void describe(Config& config, ConfigFields& fields) {
                 config.lease_s,
                 "a process that is silent for so long counts as gone",
                 {0.5, 100.0});
+  fields.text("security_folder",
+              config.security_folder,
+              "DDS-Security with the credentials that bringup/make-credentials has put there; "
+              "empty: none, and everybody may read and write");
 }
 
 int domain_of(const Config& config) {

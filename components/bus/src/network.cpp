@@ -22,7 +22,13 @@ std::string address_text(const sockaddr* address) {
 
 }  // namespace
 
-std::string cannot_join(int domain) {
+std::string cannot_join(const Config& config) {
+  const int domain = domain_of(config);
+  if (!config.security_folder.empty()) {
+    return "cannot join DDS domain " + std::to_string(domain) + " with the credentials in " +
+           config.security_folder +
+           " (are they valid now, of this computer, and is the domain at most 230?)";
+  }
   return "cannot join DDS domain " + std::to_string(domain) + " (are its UDP ports, from " +
          std::to_string(first_port(domain)) + ", free, and is there a network interface?)";
 }
@@ -57,14 +63,14 @@ NetworkInterface find_interface(const std::string& wanted) {
                            "'; interfaces with an IPv4 address are: " + known);
 }
 
-Peer parse_peer(const std::string& text) {
+Peer parse_peer(const std::string& text, const std::string& setting) {
   const std::size_t colon = text.find(':');
   const Peer peer{text.substr(0, colon),
                   colon == std::string::npos ? 0 : std::atoi(text.c_str() + colon + 1)};
   in_addr parsed{};
   const bool port_is_valid = colon == std::string::npos || (peer.port > 0 && peer.port < 65536);
   if (inet_pton(AF_INET, peer.address.c_str(), &parsed) != 1 || !port_is_valid) {
-    throw std::runtime_error("bus.initial_peers has '" + text +
+    throw std::runtime_error(setting + " has '" + text +
                              "'; expected an IPv4 address, with or without a port: 10.0.0.2:7410");
   }
   return peer;

@@ -3,6 +3,8 @@
 // Interfaces and peers of the configuration, checked the same way for every vendor.
 #pragma once
 
+#include "trigpoint/bus/config.hpp"
+
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -19,7 +21,7 @@ constexpr int first_port(int domain) {
 }
 
 /// What to say when a middleware does not let us in.
-std::string cannot_join(int domain);
+std::string cannot_join(const Config& config);
 
 struct NetworkInterface {
   std::string name;
@@ -39,7 +41,8 @@ struct Peer {
   int port{0};          ///< 0: the discovery ports of all processes there
 };
 
-/// From "10.0.0.2" or "10.0.0.2:7410"; throws std::runtime_error on everything else.
-Peer parse_peer(const std::string& text);
+/// From "10.0.0.2" or "10.0.0.2:7410"; throws std::runtime_error, which names the setting, on
+/// everything else.
+Peer parse_peer(const std::string& text, const std::string& setting = "bus.initial_peers");
 
 }  // namespace trigpoint::bus

@@ -46,6 +46,24 @@ std::int64_t paced_portion_bytes(const SocketBuffers& granted) {
   return std::max(smaller_bytes(granted) * 2 / 3, kLeast_bytes);
 }
 
+std::optional<Pacing> pacing_of(const Config& config, const SocketBuffers& granted) {
+  std::optional<Pacing> pacing;
+  if (is_small(granted)) {
+    pacing = Pacing{paced_portion_bytes(granted), kPacingPeriod};
+  }
+  const std::int64_t rate = config.bulk_bytes_per_s;
+  if (rate > 0) {
+    // A portion holds one datagram at least, so large datagrams make long periods.
+    const std::int64_t period_ms =
+        std::max<std::int64_t>(kPacingPeriod.count(), 1 + config.datagram_bytes * 1000 / rate);
+    const Pacing wanted{rate * period_ms / 1000, std::chrono::milliseconds(period_ms)};
+    const bool is_slower = !pacing || wanted.portion_bytes * pacing->period.count() <
+                                          pacing->portion_bytes * wanted.period.count();
+    pacing = is_slower ? wanted : *pacing;
+  }
+  return pacing;
+}
+
 std::optional<Event> socket_buffer_warning(std::int64_t wanted_bytes,
                                            const SocketBuffers& granted) {
   if (!is_small(granted)) {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "trigpoint/base/event.hpp"
+#include "trigpoint/bus/config.hpp"
 
 #include <chrono>
 #include <cstdint>
@@ -30,6 +31,15 @@ bool is_small(const SocketBuffers& granted);
 /// for everything else (71 MB/s at 212992 bytes).
 std::int64_t paced_portion_bytes(const SocketBuffers& granted);
 inline constexpr std::chrono::milliseconds kPacingPeriod{2};
+
+/// At most so many bytes of clouds in each period.
+struct Pacing {
+  std::int64_t portion_bytes{0};
+  std::chrono::milliseconds period{kPacingPeriod};
+};
+
+/// What small buffers and `config.bulk_bytes_per_s` ask for; nothing: clouds go as they come.
+std::optional<Pacing> pacing_of(const Config& config, const SocketBuffers& granted);
 
 /// The warning and its remedy, when the buffers are smaller than unpaced clouds need.
 std::optional<Event> socket_buffer_warning(std::int64_t wanted_bytes, const SocketBuffers& granted);

@@ -50,7 +50,8 @@ std::vector<KnownTopic> known_topics(const RobotConfig& robot) {
                               known(topics::map, cloud),
                               known(topics::tf, tf),
                               known(topics::tf_static, tf),
-                              known(topics::diagnostics, "diagnostic_msgs/msg/DiagnosticArray")};
+                              known(topics::diagnostics, "diagnostic_msgs/msg/DiagnosticArray"),
+                              known(topics::clock_probe, "diagnostic_msgs/msg/DiagnosticArray")};
   const auto add = [&all](const KnownTopic& topic) {
     const auto same = [&topic](const KnownTopic& other) { return other.name == topic.name; };
     if (std::none_of(all.begin(), all.end(), same)) {

@@ -40,7 +40,8 @@ TEST(BusConfig, reads_every_field) {
   Config config;
   load_config_text(
       "domain_id: 3\nnetwork_interface: lo\ninitial_peers: [10.0.0.2]\n"
-      "socket_buffer_bytes: 212992\ndatagram_bytes: 1472\nheartbeat_s: 0.05\nlease_s: 5\n",
+      "socket_buffer_bytes: 212992\ndatagram_bytes: 1472\nheartbeat_s: 0.05\nlease_s: 5\n"
+      "discovery_server: \"10.0.0.1:11811\"\nbulk_bytes_per_s: 5000000\nsecurity_folder: keys\n",
       "test",
       [&](ConfigFields& fields) { describe(config, fields); });
   EXPECT_EQ(config.domain_id, 3);
@@ -50,6 +51,9 @@ TEST(BusConfig, reads_every_field) {
   EXPECT_EQ(config.datagram_bytes, 1472);
   EXPECT_EQ(config.heartbeat_s, 0.05);
   EXPECT_EQ(config.lease_s, 5.0);
+  EXPECT_EQ(config.discovery_server, "10.0.0.1:11811");
+  EXPECT_EQ(config.bulk_bytes_per_s, 5'000'000);
+  EXPECT_EQ(config.security_folder, "keys");
 }
 
 TEST(TopicName, is_the_ros_name_behind_rt) {

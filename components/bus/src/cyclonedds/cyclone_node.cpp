@@ -9,6 +9,7 @@
 #include "cyclone_writer.hpp"
 #include "domain_config.hpp"
 #include "endpoint.hpp"
+#include "security.hpp"
 
 #include <algorithm>
 #include <array>
@@ -28,25 +29,53 @@ dds_domainid_t next_private_id() {
   return ++last;
 }
 
+/// With security that number is held against the governance file, where Cyclone takes none above
+/// 230: that of the network, or where a participant of this process has it, another one.
+dds_entity_t create_secured_domain(const Config& config,
+                                   const std::string& xml,
+                                   dds_domainid_t& id) {
+  constexpr dds_domainid_t kHighestGoverned = 230;
+  id = static_cast<dds_domainid_t>(domain_of(config));
+  dds_entity_t domain = dds_create_domain(id, xml.c_str());
+  for (dds_domainid_t other = kHighestGoverned;
+       domain == DDS_RETCODE_PRECONDITION_NOT_MET && other > 0;
+       --other) {
+    id = other;
+    domain = dds_create_domain(id, xml.c_str());
+  }
+  return domain;
+}
+
+dds_entity_t create_domain(const Config& config, const std::string& xml, dds_domainid_t& id) {
+  if (!config.security_folder.empty()) {
+    return create_secured_domain(config, xml, id);
+  }
+  id = next_private_id();
+  return dds_create_domain(id, xml.c_str());
+}
+
 }  // namespace
 
 CycloneNode::CycloneNode(const Config& config, const std::string& name, EventSink sink)
     : sink_(std::move(sink)) {
   const SocketBuffers buffers = permitted_socket_buffers(config.socket_buffer_bytes);
-  if (const auto warning = socket_buffer_warning(config.socket_buffer_bytes, buffers)) {
+  if (const auto pacing = pacing_of(config, buffers)) {
     paced_sender_ = std::make_unique<PacedSender>(
-        paced_portion_bytes(buffers),
-        kPacingPeriod,
-        [this](std::size_t size_bytes, dds_return_t why) { tell_not_sent(size_bytes, why); });
+        pacing->portion_bytes, pacing->period, [this](std::size_t size_bytes, dds_return_t why) {
+          tell_not_sent(size_bytes, why);
+        });
+  }
+  if (const auto warning = socket_buffer_warning(config.socket_buffer_bytes, buffers)) {
     tell(*warning);
   }
-  const std::string what = cannot_join(domain_of(config));
-  const dds_domainid_t id = next_private_id();
-  domain_ = checked(dds_create_domain(id, domain_config(config, buffers).c_str()), what);
+  const std::string what = cannot_join(config);
+  dds_domainid_t id{};
+  domain_ = checked(create_domain(config, domain_config(config, buffers), id), what);
   const QosPointer qos(dds_create_qos());
   dds_qset_entity_name(qos.get(), name.c_str());
   const std::string note = process_note();
   dds_qset_userdata(qos.get(), note.data(), note.size());
+  set_security(qos.get(), config);
   participant_ = dds_create_participant(id, qos.get(), nullptr);
   if (participant_ < 0) {
     dds_delete(domain_);

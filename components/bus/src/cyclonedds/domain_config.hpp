@@ -5,14 +5,13 @@
 
 #include "trigpoint/bus/config.hpp"
 
+#include "../rtps_limits.hpp"
 #include "../socket_buffers.hpp"
 
 #include <chrono>
 #include <string>
 
 namespace trigpoint::bus::cyclonedds {
-
-inline constexpr std::int64_t kLargestMessage_bytes = 256'000'000;  // also of what strangers send
 
 /// For the last samples of a writer that goes; longer would add up where readers are dead.
 inline constexpr std::chrono::milliseconds kLinger{100};

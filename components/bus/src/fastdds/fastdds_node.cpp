@@ -7,6 +7,7 @@
 #include "endpoint.hpp"
 #include "fastdds_reader.hpp"
 #include "fastdds_writer.hpp"
+#include "security.hpp"
 #include "transport.hpp"
 #include "wire_type.hpp"
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
@@ -36,8 +37,8 @@ void turn_off_intraprocess_delivery() {
 FastNode::FastNode(const Config& config, const std::string& name, EventSink sink)
     : config_(config), sink_(std::move(sink)) {
   const SocketBuffers buffers = permitted_socket_buffers(config.socket_buffer_bytes);
+  is_paced_ = pacing_of(config, buffers).has_value();
   if (const auto warning = socket_buffer_warning(config.socket_buffer_bytes, buffers)) {
-    is_paced_ = true;
     tell(*warning);
   }
   auto* factory = dds::DomainParticipantFactory::get_instance();
@@ -49,11 +50,12 @@ FastNode::FastNode(const Config& config, const std::string& name, EventSink sink
   const std::string note = process_note();
   qos.user_data().data_vec({note.begin(), note.end()});
   set_transport(qos, config, buffers);
+  set_security(qos, config);
   const int domain = domain_of(config);
   participant_ = factory->create_participant(
       static_cast<dds::DomainId_t>(domain), qos, this, dds::StatusMask::none());
   if (participant_ == nullptr) {
-    throw std::runtime_error(cannot_join(domain));
+    throw std::runtime_error(cannot_join(config));
   }
   publisher_ = participant_->create_publisher(dds::PUBLISHER_QOS_DEFAULT);
   subscriber_ = participant_->create_subscriber(dds::SUBSCRIBER_QOS_DEFAULT);

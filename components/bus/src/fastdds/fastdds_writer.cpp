@@ -20,6 +20,8 @@ dds::DataWriterQos writer_qos(const FastNode& node, const Qos& qos) {
   set_policies(result, qos);
   result.reliable_writer_qos().times.heartbeatPeriod =
       eprosima::fastrtps::Duration_t(node.config().heartbeat_s);
+  // What is missing is sent at once: many short repairs follow each other on a long way.
+  result.reliable_writer_qos().times.nackResponseDelay = eprosima::fastrtps::Duration_t(0, 0);
   result.publish_mode().kind = dds::SYNCHRONOUS_PUBLISH_MODE;
   if (qos.bulk && node.is_paced()) {
     result.publish_mode().kind = dds::ASYNCHRONOUS_PUBLISH_MODE;

@@ -3,10 +3,12 @@
 #include "transport.hpp"
 
 #include "../network.hpp"
+#include "limited_transport.hpp"
 #include <fastdds/rtps/flowcontrol/FlowControllerDescriptor.hpp>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastrtps/utils/IPLocator.h>
 
+#include <algorithm>
 #include <memory>
 
 namespace trigpoint::bus::fastdds {
@@ -25,6 +27,11 @@ struct Udp : UDPv4TransportDescriptor {
 
   std::uint32_t max_message_size() const override { return largest_sent_bytes; }
 };
+
+/// Of a server that was started as number 0: `fastdds discovery -i 0`.
+constexpr char kDiscoveryServerPrefix[] = "44.53.00.5f.45.50.52.4f.53.49.4d.41";
+constexpr int kDiscoveryServerPort = 11811;
+constexpr char kLoopback[] = "127.0.0.1";
 
 Locator_t peer_locator(const std::string& text) {
   const Peer peer = parse_peer(text);
@@ -51,16 +58,40 @@ void add_peers(eprosima::fastdds::dds::DomainParticipantQos& qos, const Config& 
   peers.push_back(multicast);
 }
 
-/// A portion a period that fits the smaller buffer with room for everything else.
-void add_pacing(eprosima::fastdds::dds::DomainParticipantQos& qos, const SocketBuffers& buffers) {
-  if (!is_small(buffers)) {
-    return;
-  }
+/// All discovery goes through the server then: neither multicast nor peers are asked.
+void use_discovery_server(eprosima::fastdds::dds::DomainParticipantQos& qos, const Config& config) {
+  namespace rtps = eprosima::fastrtps::rtps;
+  const Peer address = parse_peer(config.discovery_server, "bus.discovery_server");
+  rtps::RemoteServerAttributes server;
+  server.ReadguidPrefix(kDiscoveryServerPrefix);
+  Locator_t locator;
+  IPLocator::createLocator(
+      LOCATOR_KIND_UDPv4,
+      address.address,
+      static_cast<std::uint32_t>(address.port == 0 ? kDiscoveryServerPort : address.port),
+      locator);
+  server.metatrafficUnicastLocatorList.push_back(locator);
+  auto& discovery = qos.wire_protocol().builtin.discovery_config;
+  discovery.discoveryProtocol = rtps::DiscoveryProtocol_t::CLIENT;
+  discovery.discoveryServer_client_syncperiod =
+      eprosima::fastrtps::Duration_t(config.lease_s / 8.0);
+  discovery.m_DiscoveryServers.push_back(server);
+}
+
+void add_pacing(eprosima::fastdds::dds::DomainParticipantQos& qos, const Pacing& wanted) {
   auto pacing = std::make_shared<FlowControllerDescriptor>();
   pacing->name = kPacing;
-  pacing->max_bytes_per_period = static_cast<std::int32_t>(paced_portion_bytes(buffers));
-  pacing->period_ms = static_cast<std::uint64_t>(kPacingPeriod.count());
+  pacing->max_bytes_per_period = static_cast<std::int32_t>(wanted.portion_bytes);
+  pacing->period_ms = static_cast<std::uint64_t>(wanted.period.count());
   qos.flow_controllers().push_back(pacing);
+}
+
+/// Fast DDS cannot divide the messages of its handshake, with certificate and permissions: in
+/// smaller datagrams they are not sent, and nobody matches.
+std::int64_t largest_datagram_bytes(const Config& config) {
+  constexpr std::int64_t kHandshake_bytes = 5'880;  // four Ethernet frames
+  return config.security_folder.empty() ? config.datagram_bytes
+                                        : std::max(config.datagram_bytes, kHandshake_bytes);
 }
 
 }  // namespace
@@ -69,22 +100,31 @@ void set_transport(eprosima::fastdds::dds::DomainParticipantQos& qos,
                    const Config& config,
                    const SocketBuffers& buffers) {
   auto udp = std::make_shared<Udp>();
-  udp->largest_sent_bytes = static_cast<std::uint32_t>(config.datagram_bytes);
+  udp->largest_sent_bytes = static_cast<std::uint32_t>(largest_datagram_bytes(config));
   udp->sendBufferSize = static_cast<std::uint32_t>(buffers.send_bytes);
   udp->receiveBufferSize = static_cast<std::uint32_t>(buffers.receive_bytes);
   udp->maxInitialPeersRange = kProcessesPerPeer;
   if (!config.network_interface.empty()) {
     udp->interfaceWhiteList.push_back(find_interface(config.network_interface).address);
+    // Fast DDS participants without this restriction, such as a discovery server, answer those on
+    // their own computer there.
+    udp->interfaceWhiteList.push_back(kLoopback);
   }
   // Shared memory stays off: it costs seconds of reconnection after a kill and never matches
   // between root and other users (see the README).
   qos.transport().use_builtin_transports = false;
-  qos.transport().user_transports.push_back(udp);
+  qos.transport().user_transports.push_back(limited(udp));
   auto& discovery = qos.wire_protocol().builtin.discovery_config;
   discovery.leaseDuration = eprosima::fastrtps::Duration_t(config.lease_s);
   discovery.leaseDuration_announcementperiod = eprosima::fastrtps::Duration_t(config.lease_s / 4.0);
-  add_peers(qos, config);
-  add_pacing(qos, buffers);
+  if (config.discovery_server.empty()) {
+    add_peers(qos, config);
+  } else {
+    use_discovery_server(qos, config);
+  }
+  if (const auto pacing = pacing_of(config, buffers)) {
+    add_pacing(qos, *pacing);
+  }
 }
 
 }  // namespace trigpoint::bus::fastdds

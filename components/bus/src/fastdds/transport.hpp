@@ -10,7 +10,7 @@
 
 namespace trigpoint::bus::fastdds {
 
-/// Name of the flow controller of bulk writers; there is one only when buffers are small.
+/// Name of the flow controller of bulk writers; there is one only when pacing_of() says so.
 inline constexpr char kPacing[] = "trigpoint_paced";
 
 /// Throws std::runtime_error when the interface or a peer is not known.

@@ -67,5 +67,10 @@ inline constexpr Topic<tf2_msgs::msg::TFMessage> tf{"tf", qos::kTf};
 inline constexpr Topic<tf2_msgs::msg::TFMessage> tf_static{"tf_static", qos::kTfStatic};
 inline constexpr Topic<diagnostic_msgs::msg::DiagnosticArray> diagnostics{"diagnostics",
                                                                           qos::kDefault};
+/// Questions and answers between the clock watches of several computers, as diagnostics so that
+/// every tool can show them.
+inline constexpr Topic<diagnostic_msgs::msg::DiagnosticArray> clock_probe{
+    "clock_probe",
+    qos::kSensorData.with_depth(20)};
 
 }  // namespace trigpoint::bus::topics

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#pragma once
+
+#include <fastdds/rtps/transport/TransportDescriptorInterface.h>
+
+#include <memory>
+
+namespace trigpoint::bus::fastdds {
+
+/// The same transport, which drops datagrams that announce a sample above kLargestMessage_bytes:
+/// Fast DDS 2.9 makes room for it, and touches all of it, at the first fragment.
+std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> limited(
+    std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> transport);
+
+}  // namespace trigpoint::bus::fastdds

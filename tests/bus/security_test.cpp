@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// DDS-Security with the credentials of bringup/make-credentials: who has them reads and writes,
+// across vendors too; who has none, or those of somebody else, does neither.
+#include "trigpoint/bus/convert.hpp"
+#include "trigpoint/bus/topics.hpp"
+
+#include "../unit/bus/samples.hpp"
+#include "bus_fixture.hpp"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <thread>
+
+namespace trigpoint::bus {
+namespace {
+
+using ::testing::AnyOf;
+using testing::Collected;
+using ::testing::Contains;
+using ::testing::Each;
+using ::testing::Not;
+using testing::own_domain;
+using testing::Readers;
+using tests::Command;
+
+/// So many messages of a peer with credentials, 20 ms apart, are given to one without: it matches
+/// within a few milliseconds where nobody forbids it.
+constexpr std::size_t kObserved = 150;
+
+constexpr std::chrono::milliseconds kAgain{20};
+
+/// The longest name that the script takes, since it makes handshakes longer.
+constexpr char kBase[] = "base_station_with_a_longest_name";
+
+/// As between computers: what belongs to a handshake is larger.
+constexpr std::int64_t kLanDatagram_bytes = 1'472;
+
+std::string peer_program(const std::string& vendor) {
+  return std::string(TRIGPOINT_BIN_DIR) + "/bus_peer_" + vendor;
+}
+
+/// The parameter is the vendor of the other process.
+class Security : public ::testing::TestWithParam<std::string> {
+ protected:
+  void SetUp() override {
+    if (!std::filesystem::exists(peer_program(GetParam()))) {
+      GTEST_SKIP() << "there is no " << GetParam() << " in this build";
+    }
+    make_credentials("ours");
+    make_credentials("theirs");
+  }
+
+  std::string credentials(const std::string& authority, const std::string& host) const {
+    return folder_.path(authority + "/" + host);
+  }
+
+  static Config secured(const std::string& credentials) {
+    Config config = own_domain();
+    config.security_folder = credentials;
+    config.datagram_bytes = kLanDatagram_bytes;
+    return config;
+  }
+
+  /// Without credentials when `credentials` is empty.
+  static std::unique_ptr<Command> peer(const std::string& vendor,
+                                       std::vector<std::string> what,
+                                       const std::string& credentials) {
+    what.insert(what.begin(), {peer_program(vendor), std::to_string(own_domain().domain_id)});
+    std::map<std::string, std::string> environment;
+    if (!credentials.empty()) {
+      environment["BUS_PEER_SECURITY"] = credentials;
+    }
+    return std::make_unique<Command>(what, environment);
+  }
+
+  /// Nobody with these credentials, here or in a process of the other vendor, hears us or is heard.
+  void expect_is_kept_out(const std::string& credentials_of_stranger) const {
+    Participant robot(secured(credentials("ours", "robot")), "robot");
+    Collected<std::string> heard;
+    Collected<std::string> writers;
+    Subscription<sensor_msgs::msg::NavSatFix> fixes(
+        robot,
+        topics::fix,
+        [&](const auto&, const MessageInfo& info) { heard.add(info.writer_guid); },
+        {[&](const std::string& guid) { writers.add(guid); }, {}, {}});
+    Publisher imu(robot, topics::imu);
+
+    Participant stranger(secured(credentials_of_stranger), "stranger");
+    Collected<std::string>
+        overheard;  // the forger's fixes among them, which is none of our business
+    const auto overhear = [&](const auto&, const MessageInfo& info) {
+      overheard.add(info.writer_guid);
+    };
+    Subscription<sensor_msgs::msg::NavSatFix> stolen_fixes(stranger, topics::fix, overhear);
+    Subscription<sensor_msgs::msg::Imu> stolen_imu(stranger, topics::imu, overhear);
+    const auto forger = peer(GetParam(), {"fix"}, credentials_of_stranger);
+    const auto listener = peer(GetParam(), {"hear", "imu"}, credentials_of_stranger);
+
+    const auto friendly = peer(backend::name(), {"fix"}, credentials("ours", kBase));
+    ASSERT_TRUE(heard.wait_for(1)) << friendly->output_so_far();
+    while (heard.size() < kObserved) {
+      imu.publish(to_message(samples::imu()));
+      std::this_thread::sleep_for(kAgain);
+    }
+    EXPECT_TRUE(forger->running() && listener->running()) << "no longer there to be kept out";
+    EXPECT_EQ(writers.size(), 1U);
+    EXPECT_EQ(fixes.matched(), 1);
+    EXPECT_EQ(imu.matched(), 0);
+    EXPECT_THAT(heard.items(), Each(writers.items().front()));
+    EXPECT_THAT(overheard.items(),
+                Not(AnyOf(Contains(writers.items().front()), Contains(imu.guid()))));
+  }
+
+ private:
+  void make_credentials(const std::string& authority) const {
+    const auto made = tests::run_command({TRIGPOINT_SOURCE_DIR "/bringup/make-credentials",
+                                          folder_.path(authority),
+                                          "robot",
+                                          kBase});
+    ASSERT_EQ(made.exit_code, 0) << made.output;
+  }
+
+  const tests::TemporaryFolder folder_;
+};
+
+TEST_P(Security, lets_those_with_credentials_hear_each_other) {
+  Participant robot(secured(credentials("ours", "robot")), "robot");
+  Collected<GnssFix> heard;
+  Subscription<sensor_msgs::msg::NavSatFix> fixes(
+      robot, topics::fix, [&](const auto& fix, const MessageInfo&) {
+        heard.add(from_message(fix));
+      });
+  Readers readers;
+  Publisher imu(robot, topics::imu, readers.events());
+  const auto writer = peer(GetParam(), {"fix"}, credentials("ours", kBase));
+  const auto reader = peer(GetParam(), {"hear", "imu"}, credentials("ours", kBase));
+  ASSERT_TRUE(heard.wait_for(1)) << writer->output_so_far();
+  samples::expect_equal(heard.items().front(), samples::fix());
+  ASSERT_TRUE(readers.wait_for(1)) << reader->output_so_far();
+  imu.publish(to_message(samples::imu()));
+  EXPECT_TRUE(imu.wait_for_acknowledgments(testing::kForever));
+}
+
+TEST_P(Security, lets_nobody_without_credentials_read_or_write) {
+  expect_is_kept_out("");
+}
+
+TEST_P(Security, lets_nobody_with_credentials_of_another_authority_read_or_write) {
+  expect_is_kept_out(credentials("theirs", "robot"));
+}
+
+TEST_P(Security, names_a_file_that_is_missing) {
+  const std::string folder = credentials("ours", "robot");
+  std::filesystem::remove(folder + "/permissions.p7s");
+  try {
+    Participant participant(secured(folder), "incomplete");
+    FAIL() << "accepted";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("permissions.p7s"));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Vendors,
+                         Security,
+                         ::testing::Values("fastdds", "cyclonedds"),
+                         [](const auto& vendor) {
+                           return std::string("of_") + backend::name() + "_with_" + vendor.param;
+                         });
+
+}  // namespace
+}  // namespace trigpoint::bus
