@@ -11,9 +11,11 @@
 #include "trigpoint/lio_mapper/lio_mapper.hpp"
 #include "trigpoint/pipeline/past_beside.hpp"
 #include "trigpoint/pipeline/session_parts.hpp"
+#include "trigpoint/shell/service_notice.hpp"
 #include "trigpoint/shell/shell.hpp"
 
 #include "decode_ahead.hpp"
+#include "only_one.hpp"
 
 #include <chrono>
 #include <memory>
@@ -85,7 +87,8 @@ class Process {
         map_(participant_, topics::map),
         tf_(participant_, topics::tf),
         tf_static_(participant_, topics::tf_static),
-        diagnostics_(participant_, topics::diagnostics) {
+        diagnostics_(participant_, topics::diagnostics),
+        only_one_(participant_, loop, "lio_mapper", log) {
     if (!options.session.empty()) {
       exporter::create_session_folder(options.session);
       open_session(options.session);
@@ -140,8 +143,8 @@ class Process {
     writing_.finish();
   }
 
-  /// After close().
-  bool failed() const { return disk_.failed(); }
+  /// After close(). 2: there is another one, which no restart changes.
+  int exit_code() const { return only_one_.is_too_many() ? 2 : disk_.failed() ? 1 : 0; }
 
  private:
   /// A session that holds a checkpoint is one in which this program died or was stopped: it goes
@@ -282,6 +285,7 @@ class Process {
   bus::Publisher<tf2_msgs::msg::TFMessage> tf_;
   bus::Publisher<tf2_msgs::msg::TFMessage> tf_static_;
   bus::Publisher<diagnostic_msgs::msg::DiagnosticArray> diagnostics_;
+  shell::OnlyOne only_one_;
   std::optional<bus::Subscription<trigpoint_msgs::msg::StateUpdate>> updates_;
   std::optional<bus::Subscription<sensor_msgs::msg::Imu>> imu_;
   std::optional<bus::Subscription<sensor_msgs::msg::PointCloud2>> points_;
@@ -293,10 +297,14 @@ int run(const shell::Options& options, const shell::EventLog& log) {
   const Settings settings = load(options);
   bus::Loop loop;
   Process process(settings, options, log, loop);
+  const shell::ServiceNotice notice;
+  loop.every(shell::ServiceNotice::kPeriod, [&notice] { notice.alive(); });
+  notice.ready();
   log.info("ready");
   loop.run();
+  notice.stopping();
   process.close();
-  return process.failed() ? 1 : 0;
+  return process.exit_code();
 }
 
 }  // namespace
