@@ -159,6 +159,7 @@ struct FusionGate::Impl {
   enum class Carrier { kLio, kGps };
   std::optional<Odometry> last_raw;
   std::optional<Carrier> last_carrier;
+  std::string last_gps_writer;  // of the GPS odometry that carried
   std::uint32_t last_epoch{0};
   std::optional<Odometry> last_odom;
   std::optional<Nanoseconds> odom_jumped_at_status_ns;

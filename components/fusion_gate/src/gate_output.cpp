@@ -125,8 +125,10 @@ void FusionGate::Impl::publish_gps(Output& out) {
   const Odometry base = move_to_base(*gps, robot.antenna_position_base_m);
   const Pose predicted = as_predicted(base.stamp_ns, base.T_frame_child);
   const bool steps = (predicted.p - base.T_frame_child.p).norm() > kGpsStep_m;
-  const bool goes_on = last_carrier == Carrier::kGps && !steps;
+  const bool same_filter = last_gps_writer == sources.followed();
+  const bool goes_on = last_carrier == Carrier::kGps && same_filter && !steps;
   last_carrier = Carrier::kGps;
+  last_gps_writer = sources.followed();
   publish(base, goes_on ? base.T_frame_child : predicted, out);
 }
 
