@@ -158,6 +158,7 @@ struct FusionGate::Impl {
   // --- what fusion/odometry rested on last
   enum class Carrier { kLio, kGps };
   std::optional<Odometry> last_raw;
+  std::deque<Odometry> recent_raw;  // up to last_raw: how the robot moves
   std::optional<Carrier> last_carrier;
   std::string last_gps_writer;  // of the GPS odometry that carried
   std::uint32_t last_epoch{0};

@@ -17,6 +17,9 @@ constexpr double kDefaultFixInterval_s = 1.0;
 constexpr double kHighestSpeed_mps = 60.0;
 constexpr double kGpsStep_m = 0.5;  // a GPS filter was set anew: more than corrections at 5 Hz move
 
+constexpr double kMotion_s = 0.5;       // over which the robot's motion is seen
+constexpr double kLeastMotion_s = 0.1;  // for less, the twist
+
 }  // namespace
 
 bool FusionGate::Impl::lio_carries() const {
@@ -132,14 +135,26 @@ void FusionGate::Impl::publish_gps(Output& out) {
   publish(base, goes_on ? base.T_frame_child : predicted, out);
 }
 
-/// Where the last raw pose and its twist lead; `otherwise` when there is none.
+/// Where the last raw poses lead; `otherwise` when there is none. By their displacement: the twist
+/// of a single one, as of a LIO that has just lost its track, may be anything.
 Pose FusionGate::Impl::as_predicted(Nanoseconds stamp_ns, const Pose& otherwise) const {
   if (!last_raw) {
     return otherwise;
   }
+  const Pose& last = last_raw->T_frame_child;
+  const Pose& first = recent_raw.front().T_frame_child;
   const double dt_s = to_seconds(stamp_ns - last_raw->stamp_ns);
-  return last_raw->T_frame_child *
-         Pose{so3_exp(last_raw->angular_radps * dt_s), last_raw->linear_mps * dt_s};
+  const double known_s = to_seconds(last_raw->stamp_ns - recent_raw.front().stamp_ns);
+  if (known_s < kLeastMotion_s) {
+    return last * Pose{so3_exp(last_raw->angular_radps * dt_s), last_raw->linear_mps * dt_s};
+  }
+  const double share = dt_s / known_s;
+  const Eigen::Vector3d turned_rad = so3_log(first.q.conjugate() * last.q);
+  // On an arc a chord lies half way between the headings at its ends.
+  const Eigen::Quaterniond past_to_coming_chord = so3_exp(0.5 * (1.0 + share) * turned_rad);
+  const Eigen::Vector3d moved_first_m = first.q.conjugate() * (last.p - first.p);
+  return {(last.q * so3_exp(share * turned_rad)).normalized(),
+          last.p + share * (first.q * (past_to_coming_chord * moved_first_m))};
 }
 
 void FusionGate::Impl::publish(const Odometry& odometry, const Pose& unchanged, Output& out) {
@@ -149,6 +164,10 @@ void FusionGate::Impl::publish(const Odometry& odometry, const Pose& unchanged, 
   }
   last_fused_ns = odometry.stamp_ns;
   last_raw = odometry;
+  recent_raw.push_back(odometry);
+  while (to_seconds(odometry.stamp_ns - recent_raw.front().stamp_ns) > kMotion_s) {
+    recent_raw.pop_front();
+  }
   out.fused_raw = odometry;
   out.fused = mode == Mode::kSmooth ? hand_over.follow(odometry, unchanged) : odometry;
 }

@@ -50,6 +50,14 @@ class Pace {
     });
   }
 
+  /// What has gone out so far, also when nobody is waited for.
+  void published(std::uint64_t sweeps, std::uint64_t imu, std::uint64_t fixes) {
+    const std::scoped_lock lock(mutex_);
+    sweeps_.ask(sweeps);
+    imu_.ask(imu);
+    fixes_.ask(fixes);
+  }
+
   bool wait_for_sweeps(std::uint64_t published, std::chrono::milliseconds patience) {
     return wait_for(sweeps_, published, patience);
   }

@@ -109,6 +109,7 @@ class Player {
     publish_clock(entry.receive_ns);
     if (!entry.withheld) {
       std::visit([this](const auto& measurement) { send(measurement); }, entry.measurement);
+      pace_.published(result.sweeps, result.imu, result.fixes);
     }
   }
 
