@@ -13,6 +13,8 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <map>
+#include <memory>
 #include <mutex>
 #include <regex>
 #include <set>
@@ -31,6 +33,7 @@ namespace topics = bus::topics;
 
 constexpr auto kPause = 1500ms;      ///< shorter than the bus's lease
 constexpr double kWatched_s = 10.0;  ///< after a blow
+constexpr auto kHangFound = 25s;     ///< more than any watchdog's patience
 constexpr auto kFirstWord = 120s;
 constexpr auto kReport = 300s;
 
@@ -81,11 +84,15 @@ pid_t number_of(const std::string& session, const std::string& process) {
   return pid;
 }
 
-std::set<std::string> shared_memory() {
+/// Files in /dev/shm that a process has mapped: what it would leave there when it is killed. (The
+/// folder itself also holds what others on this computer leave.)
+std::set<std::string> shared_memory_of(pid_t pid) {
   std::set<std::string> names;
-  std::error_code none;
-  for (const auto& entry : fs::directory_iterator("/dev/shm", none)) {
-    names.insert(entry.path().filename().string());
+  std::ifstream maps("/proc/" + std::to_string(pid) + "/maps");
+  for (std::string line; std::getline(maps, line);) {
+    if (const auto at = line.find("/dev/shm/"); at != std::string::npos) {
+      names.insert(line.substr(at));
+    }
   }
   return names;
 }
@@ -96,6 +103,7 @@ struct Struck {
   Clock::time_point at;
   Clock::time_point returned;  ///< started again, or continued
   bool restarted{false};
+  std::set<std::string> shared_memory;
 };
 
 Struck strike(const Blow& blow, const std::string& session) {
@@ -103,7 +111,7 @@ Struck strike(const Blow& blow, const std::string& session) {
   if (pid <= 0) {
     throw std::runtime_error("no process number of " + blow.process);
   }
-  Struck struck{blow, Clock::now(), {}, false};
+  Struck struck{blow, Clock::now(), {}, false, shared_memory_of(pid)};
   kill(pid, blow.kind == Kind::kKill ? SIGKILL : SIGSTOP);
   if (blow.kind == Kind::kPause) {
     std::this_thread::sleep_for(kPause);
@@ -111,7 +119,7 @@ Struck strike(const Blow& blow, const std::string& session) {
     struck.returned = Clock::now();
     return struck;
   }
-  const auto deadline = Clock::now() + 15s;
+  const auto deadline = Clock::now() + kHangFound;
   pid_t now = pid;
   while (Clock::now() < deadline && (now == pid || now == 0)) {
     std::this_thread::sleep_for(10ms);
@@ -199,7 +207,6 @@ const char* name_of(Kind kind) {
 
 DriveResult drive(const DriveSettings& settings, const std::vector<Blow>& blows) {
   setenv("ROS_DOMAIN_ID", settings.domain.c_str(), 1);
-  const std::set<std::string> shared_before = shared_memory();
   Ear ear;
   std::vector<std::string> arguments{std::string(TRIGPOINT_SOURCE_DIR) + "/bringup/run",
                                      settings.scenario,
@@ -235,11 +242,7 @@ DriveResult drive(const DriveSettings& settings, const std::vector<Blow>& blows)
   result.output = ended.output;
   for (const Struck& one : struck) {
     result.blows.push_back(judge(one, ear));
-  }
-  for (const std::string& name : shared_memory()) {
-    if (!shared_before.contains(name)) {
-      result.left_in_shared_memory.push_back(name);
-    }
+    result.left_in_shared_memory.insert(one.shared_memory.begin(), one.shared_memory.end());
   }
   score(settings.session, result);
   return result;

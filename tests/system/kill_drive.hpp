@@ -6,10 +6,8 @@
 
 #include "trigpoint/export/session.hpp"
 
-#include <chrono>
-#include <map>
-#include <memory>
-#include <optional>
+#include <cstdint>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -44,9 +42,9 @@ struct DriveResult {
   double smoothed_rmse_m{1e9};  ///< fused_smoothed.tum
   std::uint64_t map_points{0};
   std::uint64_t scans_played{0};
-  std::uint64_t scans_done{0};    ///< with a pose in lio.tum
-  std::uint64_t scans_listed{0};  ///< as missed, in the report
-  std::vector<std::string> left_in_shared_memory;
+  std::uint64_t scans_done{0};                  ///< with a pose in lio.tum
+  std::uint64_t scans_listed{0};                ///< as missed, in the report
+  std::set<std::string> left_in_shared_memory;  ///< by those that were struck
 };
 
 struct DriveSettings {

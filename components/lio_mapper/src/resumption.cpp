@@ -23,12 +23,6 @@ constexpr std::size_t kSweepsBetweenAttempts = 5;
 constexpr std::size_t kMostSweeps = 20;  // that are put together for a registration
 /// A robot that was restarted while it drove has gone on at most this long at its speed.
 constexpr double kLongestDrive_s = 5.0;
-/// A mapper that comes back at once need not look as far as one of another day: what motion may
-/// have done beyond the prediction.
-constexpr double kNear_m = 1.5;
-constexpr double kNearYaw_rad = 0.15;
-constexpr double kUnknownSpeed_mps = 2.0;
-constexpr double kUnknownTurn_radps = 0.3;
 /// The heading's rate while nobody looked is taken from so much of the IMU after it.
 constexpr double kTurnWindow_s = 0.2;
 constexpr double kTurned_rad = 0.2;
@@ -162,14 +156,15 @@ std::vector<SearchArea> Resumption::areas(Nanoseconds now_ns,
   const double away_s = std::max(0.0, to_seconds(now_ns - checkpoint_.stamp_ns));
   const Vector3d driven_m = away_s * checkpoint_.v_odom_mps;
   const double turned_rad = away_s * turn_radps;
-  SearchArea at_checkpoint{
-      {last * T_first_newest},
-      std::min(radius_m, kNear_m + away_s * kUnknownSpeed_mps + driven_m.norm()),
-      std::min(yaw_rad, kNearYaw_rad + away_s * kUnknownTurn_radps + std::abs(turned_rad))};
+  SearchArea at_checkpoint{{last * T_first_newest}, radius_m, yaw_rad};
+  // Along an arc, whose chord points half way between the headings.
+  const Pose predicted((from_yaw(turned_rad) * last.q).normalized(),
+                       last.p + from_yaw(0.5 * turned_rad) * driven_m);
+  if (away_s < kLongestDrive_s) {
+    // Who comes back at once need not search: nothing else is as near as the predicted place.
+    result.insert(result.begin(), SearchArea{{predicted * T_first_newest}, 0.0, 0.0});
+  }
   if (away_s < kLongestDrive_s && (driven_m.norm() > 1.0 || std::abs(turned_rad) > kTurned_rad)) {
-    // Along an arc, whose chord points half way between the headings.
-    const Pose predicted((from_yaw(turned_rad) * last.q).normalized(),
-                         last.p + from_yaw(0.5 * turned_rad) * driven_m);
     at_checkpoint.centres_odom.push_back(predicted * T_first_newest);
   }
   result.push_back(std::move(at_checkpoint));
