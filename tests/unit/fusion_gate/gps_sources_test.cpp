@@ -129,6 +129,21 @@ TEST_F(TwoFilters, that_speak_once_a_second_are_not_taken_for_dead_between_two_w
   EXPECT_GT(hand_over_s(Event::kDies, 1.0), 0.5);
 }
 
+TEST(GpsSources, do_not_take_a_first_stamp_of_zero_for_a_usual_gap) {
+  GpsSources sources{Config{}};
+  sources.on_status(status_at(0.0, GpsHealth::kInit), "a");
+  for (int k = 0; k < 500; ++k) {
+    const double now_s = 1.7e9 + 0.02 * k;
+    sources.on_status(status_at(now_s, GpsHealth::kOk, now_s), "a");
+    sources.on_status(status_at(now_s, GpsHealth::kDegraded, now_s), "b");
+    sources.select(from_seconds(now_s));
+  }
+  ASSERT_EQ(sources.followed(), "a");
+  const double later_s = 1.7e9 + 10.0 + kHandOver_s;
+  sources.on_status(status_at(later_s, GpsHealth::kDegraded, later_s), "b");
+  EXPECT_TRUE(sources.select(from_seconds(later_s)));
+}
+
 TEST(GpsSources, do_not_leave_a_silent_one_for_one_that_is_of_no_use) {
   GpsSources sources{Config{}};
   sources.on_status(status_at(10.0, GpsHealth::kOk), "a");

@@ -45,7 +45,9 @@ GpsSource& GpsSources::heard(const std::string& writer, Nanoseconds stamp_ns) {
   GpsSource& source = entry->second;
   const double gap_s = to_seconds(stamp_ns - source.last_heard_ns);
   if (gap_s > 0.0) {
-    source.usual_gap_s = std::max(gap_s, source.usual_gap_s * std::exp(-gap_s / kGapMemory_s));
+    // The first stamp may be none (zero): a gap beyond the timeout says nothing of what is usual.
+    source.usual_gap_s = std::max(std::min(gap_s, config_.source_timeout_s),
+                                  source.usual_gap_s * std::exp(-gap_s / kGapMemory_s));
     source.last_heard_ns = stamp_ns;
   }
   return source;
