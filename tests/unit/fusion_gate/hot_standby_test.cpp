@@ -24,14 +24,14 @@ constexpr double kStep_m = 0.3 / kRate_hz + 1e-6;
 
 class TwoFiltersWithoutLio : public ::testing::Test {
  protected:
-  void say(const std::string& writer, double now_s, double north_m) {
+  void say(const std::string& writer, double now_s, double north_m, double climb_mps = 0.0) {
     Odometry odometry;
     odometry.stamp_ns = from_seconds(1000.0 + now_s);
     odometry.frame_id = "map";
     odometry.child_frame_id = "base_link";
     odometry.T_frame_child.p = {kSpeed_mps * now_s, north_m, 0.0};
     odometry.pose_covariance = PoseCovariance::Identity() * 0.01;
-    odometry.linear_mps = {kSpeed_mps, 0.0, 0.0};
+    odometry.linear_mps = {kSpeed_mps, 0.0, climb_mps};
     GpsStatus status;
     status.stamp_ns = odometry.stamp_ns;
     status.source = writer;
@@ -49,6 +49,7 @@ class TwoFiltersWithoutLio : public ::testing::Test {
     if (!out.fused) {
       return;
     }
+    highest_m_ = std::max(highest_m_, std::abs(out.fused->T_frame_child.p.z()));
     if (last_) {
       const double dt_s = to_seconds(out.fused->stamp_ns - last_->stamp_ns);
       const Eigen::Vector3d moved_m = out.fused->T_frame_child.p - last_->T_frame_child.p;
@@ -63,6 +64,7 @@ class TwoFiltersWithoutLio : public ::testing::Test {
   FusionGate gate_{Config{}, RobotConfig{}};
   std::optional<Odometry> last_;
   double worst_step_per_message_m_{0.0};
+  double highest_m_{0.0};  ///< the drive is level
   double handed_over_s_{1e9};
 };
 
@@ -79,6 +81,20 @@ TEST_F(TwoFiltersWithoutLio, hands_over_within_half_a_second_and_without_a_step)
   EXPECT_LT(handed_over_s_, kHandOver_s);
   EXPECT_LT(worst_step_per_message_m_, kStep_m);
   EXPECT_NEAR(last_->T_frame_child.p.y(), kApart_m, 1e-3) << "the new one is followed in the end";
+}
+
+TEST_F(TwoFiltersWithoutLio, are_not_led_astray_by_the_last_twist_of_the_one_that_fails) {
+  gate_.on_datum(datum_);
+  for (int k = 0; k < 25 * static_cast<int>(kRate_hz); ++k) {
+    const double now_s = k / kRate_hz;
+    const bool last_word = now_s >= kDies_s - 1.5 / kRate_hz;
+    if (now_s < kDies_s) {
+      say("a", now_s, 0.0, last_word ? 10.0 : 0.0);
+    }
+    say("b", now_s, kApart_m);
+  }
+  EXPECT_LT(handed_over_s_, kHandOver_s);
+  EXPECT_LT(highest_m_, 0.01);
 }
 
 }  // namespace
