@@ -35,6 +35,11 @@ constexpr std::size_t kUnwrittenScans = 100;
 /// The correction of the past takes what the odometry leaves.
 constexpr int kPastNiceness = 10;
 
+/// Silence that a supervisor is asked for: finding the place in the map again is one long piece of
+/// work.
+constexpr std::chrono::seconds kSearching{20};
+constexpr std::chrono::seconds kTracking{3};
+
 constexpr std::chrono::seconds kMapPeriod{5};  ///< the latched local map, while somebody listens
 
 struct Settings {
@@ -74,8 +79,10 @@ class Process {
   Process(const Settings& settings,
           const shell::Options& options,
           const shell::EventLog& log,
-          bus::Loop& loop)
+          bus::Loop& loop,
+          const shell::ServiceNotice& notice)
       : log_(log),
+        notice_(notice),
         disk_(log),
         core_(settings.mapper, settings.robot),
         decoding_(settings.mapper, kDecodedClouds),
@@ -172,8 +179,17 @@ class Process {
     }
   }
 
+  void ask_for_patience() {
+    const bool searching = core_.status().health != LioHealth::kOk;
+    if (searching != searching_) {
+      searching_ = searching;
+      notice_.allow_silence(searching ? kSearching : kTracking);
+    }
+  }
+
   template <typename Feed>
   void take(Feed feed) {
+    ask_for_patience();
     const Clock::time_point before = Clock::now();
     lio_mapper::Output output = feed();
     const double elapsed_ms =
@@ -269,6 +285,8 @@ class Process {
   }
 
   shell::EventLog log_;
+  const shell::ServiceNotice& notice_;
+  bool searching_{false};
   shell::DiskGuard disk_;  ///< used by the writing thread
   lio_mapper::LioMapper core_;
   lio_mapper::DecodeAhead decoding_;
@@ -296,8 +314,8 @@ class Process {
 int run(const shell::Options& options, const shell::EventLog& log) {
   const Settings settings = load(options);
   bus::Loop loop;
-  Process process(settings, options, log, loop);
   const shell::ServiceNotice notice;
+  Process process(settings, options, log, loop, notice);
   loop.every(shell::ServiceNotice::kPeriod, [&notice] { notice.alive(); });
   notice.ready();
   log.info("ready");

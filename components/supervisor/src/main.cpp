@@ -37,7 +37,7 @@ struct Options {
   std::string log_file;
   std::string records_file;
   std::string pid_file;
-  double watchdog_s{5.0};
+  double watchdog_s{3.0};
   double stop_timeout_s{30.0};
   std::vector<std::string> command;
 };
@@ -100,6 +100,7 @@ class Supervisor {
       answered_ = Clock::now();
     }
     is_closing_ = is_closing_ || heard.stopping;
+    watchdog_s_ = heard.watchdog_s.value_or(watchdog_s_);
   }
 
   /// The exit code once all is over.
@@ -122,7 +123,7 @@ class Supervisor {
 
   /// Kills what no longer answers, or does not stop.
   void insist() {
-    const double patience_s = is_closing_ ? options_.stop_timeout_s : options_.watchdog_s;
+    const double patience_s = is_closing_ ? options_.stop_timeout_s : watchdog_s_;
     const bool hangs = answered_ && !stopping_since_ && options_.watchdog_s > 0.0 &&
                        seconds_since(*answered_) > patience_s;
     const bool lingers =
@@ -140,6 +141,7 @@ class Supervisor {
     child_ = start_child({options_.command, notices_.address(), options_.log_file});
     started_ = Clock::now();
     answered_.reset();
+    watchdog_s_ = options_.watchdog_s;
     is_closing_ = false;
     hung_ = false;
     if (!options_.pid_file.empty()) {
@@ -222,6 +224,7 @@ class Supervisor {
   Clock::time_point start_at_;
   std::optional<Clock::time_point> answered_;  ///< last; none: it has not said yet that it will
   std::optional<Clock::time_point> stopping_since_;
+  double watchdog_s_{0.0};  ///< the program may ask for another one
   bool is_closing_{false};
   bool hung_{false};
   bool held_up_{false};

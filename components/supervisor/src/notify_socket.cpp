@@ -9,6 +9,7 @@
 #include <array>
 #include <cerrno>
 #include <cstddef>
+#include <cstdlib>
 #include <cstring>
 #include <stdexcept>
 #include <string_view>
@@ -41,6 +42,11 @@ NotifySocket::Heard NotifySocket::take() const {
     }
     heard.anything = true;
     const std::string_view words(text.data(), static_cast<std::size_t>(size));
+    constexpr std::string_view kWatchdog = "WATCHDOG_USEC=";
+    if (const auto at = words.find(kWatchdog); at != std::string_view::npos) {
+      heard.watchdog_s =
+          1e-6 * std::strtod(std::string(words.substr(at + kWatchdog.size())).c_str(), nullptr);
+    }
     heard.stopping = heard.stopping || words.find("STOPPING=1") != std::string_view::npos;
   }
 }

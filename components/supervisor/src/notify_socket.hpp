@@ -2,6 +2,7 @@
 // Copyright the Trigpoint developers
 #pragma once
 
+#include <optional>
 #include <string>
 
 namespace trigpoint::supervisor {
@@ -22,6 +23,7 @@ class NotifySocket {
   struct Heard {
     bool anything{false};
     bool stopping{false};
+    std::optional<double> watchdog_s;  ///< another one is asked for
   };
 
   /// What has come since the last call.

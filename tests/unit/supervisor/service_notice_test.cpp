@@ -53,6 +53,8 @@ TEST(ServiceNotice, says_in_the_words_of_sd_notify_what_the_program_does) {
   EXPECT_EQ(supervisor.heard(), "READY=1\nWATCHDOG=1");
   notice.alive();
   EXPECT_EQ(supervisor.heard(), "WATCHDOG=1");
+  notice.allow_silence(std::chrono::seconds(20));
+  EXPECT_EQ(supervisor.heard(), "WATCHDOG_USEC=20000000\nWATCHDOG=1");
   notice.stopping();
   EXPECT_EQ(supervisor.heard(), "STOPPING=1");
 }

@@ -96,6 +96,18 @@ TEST_F(Supervise, kills_and_restarts_what_promised_to_answer_and_does_not) {
   EXPECT_THAT(supervisor.output_so_far(), HasSubstr("has not answered for 0.5 s: killing it"));
 }
 
+TEST_F(Supervise, has_as_much_patience_as_it_is_asked_for) {
+  const std::string ask =
+      "python3 -c 'import os,socket; s=socket.socket(socket.AF_UNIX,socket.SOCK_DGRAM); "
+      "s.sendto(b\"WATCHDOG_USEC=30000000\\nWATCHDOG=1\",\"\\0\"+os.environ[\"NOTIFY_SOCKET\"][1:])"
+      "'; "
+      "exec sleep 60";
+  Command supervisor(command(ask, {"--watchdog", "0.3"}));
+  ASSERT_TRUE(wait_for_lives(1));
+  std::this_thread::sleep_for(2s);
+  EXPECT_EQ(lives(), 1) << supervisor.output_so_far();
+}
+
 TEST_F(Supervise, leaves_alone_what_never_promised_to_answer) {
   Command supervisor(command("exec sleep 60", {"--watchdog", "0.3"}));
   ASSERT_TRUE(wait_for_lives(1));

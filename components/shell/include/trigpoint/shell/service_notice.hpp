@@ -24,6 +24,12 @@ class ServiceNotice {
 
   void alive() const { send("WATCHDOG=1"); }
 
+  /// From now on silence may last this long before it counts as hanging.
+  void allow_silence(std::chrono::seconds longest) const {
+    send("WATCHDOG_USEC=" + std::to_string(std::chrono::microseconds(longest).count()) +
+         "\nWATCHDOG=1");
+  }
+
   /// What follows may take long.
   void stopping() const { send("STOPPING=1"); }
 
