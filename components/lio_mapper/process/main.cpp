@@ -38,7 +38,6 @@ constexpr int kPastNiceness = 10;
 /// Silence that a supervisor is asked for: finding the place in the map again is one long piece of
 /// work.
 constexpr std::chrono::seconds kSearching{20};
-constexpr std::chrono::seconds kTracking{3};
 
 constexpr std::chrono::seconds kMapPeriod{5};  ///< the latched local map, while somebody listens
 
@@ -183,7 +182,7 @@ class Process {
     const bool searching = core_.status().health != LioHealth::kOk;
     if (searching != searching_) {
       searching_ = searching;
-      notice_.allow_silence(searching ? kSearching : kTracking);
+      searching ? notice_.allow_silence(kSearching) : notice_.allow_usual_silence();
     }
   }
 

@@ -6,6 +6,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdlib>
 #include <cstring>
@@ -13,6 +14,9 @@
 namespace trigpoint::shell {
 
 ServiceNotice::ServiceNotice() {
+  if (const char* watchdog_us = std::getenv("WATCHDOG_USEC"); watchdog_us != nullptr) {
+    usual_silence_ = std::chrono::microseconds(std::strtoll(watchdog_us, nullptr, 10));
+  }
   const char* named = std::getenv("NOTIFY_SOCKET");
   address_ = named == nullptr ? "" : named;
   const bool usable = (address_.starts_with('/') || address_.starts_with('@')) &&
@@ -25,6 +29,13 @@ ServiceNotice::ServiceNotice() {
 ServiceNotice::~ServiceNotice() {
   if (socket_ >= 0) {
     ::close(socket_);
+  }
+}
+
+void ServiceNotice::allow_silence(std::chrono::microseconds longest) const {
+  if (usual_silence_.count() > 0) {
+    send("WATCHDOG_USEC=" + std::to_string(std::max(longest, usual_silence_).count()) +
+         "\nWATCHDOG=1");
   }
 }
 

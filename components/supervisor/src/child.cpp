@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
@@ -36,6 +37,10 @@ constexpr int kCannotBeStarted = 127;  ///< as a shell says it
     }
   }
   setenv("NOTIFY_SOCKET", settings.notify_address.c_str(), 1);
+  unsetenv("WATCHDOG_USEC");  // a supervisor's of ours
+  if (settings.watchdog_s > 0.0) {
+    setenv("WATCHDOG_USEC", std::to_string(std::llround(1e6 * settings.watchdog_s)).c_str(), 1);
+  }
   std::vector<char*> arguments;
   for (const std::string& argument : settings.command) {
     arguments.push_back(const_cast<char*>(argument.c_str()));

@@ -13,7 +13,8 @@ namespace trigpoint::supervisor {
 struct ChildSettings {
   std::vector<std::string> command;
   std::string notify_address;
-  std::string log_file;  ///< its output is appended; empty: ours
+  double watchdog_s{0.0};  ///< for WATCHDOG_USEC; 0: none
+  std::string log_file;    ///< its output is appended; empty: ours
 };
 
 /// Starts it; it gets SIGTERM when this process dies. Throws std::runtime_error.

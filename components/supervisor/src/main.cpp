@@ -138,7 +138,8 @@ class Supervisor {
   }
 
   void start() {
-    child_ = start_child({options_.command, notices_.address(), options_.log_file});
+    child_ =
+        start_child({options_.command, notices_.address(), options_.watchdog_s, options_.log_file});
     started_ = Clock::now();
     answered_.reset();
     watchdog_s_ = options_.watchdog_s;

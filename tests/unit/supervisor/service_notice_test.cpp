@@ -53,10 +53,23 @@ TEST(ServiceNotice, says_in_the_words_of_sd_notify_what_the_program_does) {
   EXPECT_EQ(supervisor.heard(), "READY=1\nWATCHDOG=1");
   notice.alive();
   EXPECT_EQ(supervisor.heard(), "WATCHDOG=1");
-  notice.allow_silence(std::chrono::seconds(20));
-  EXPECT_EQ(supervisor.heard(), "WATCHDOG_USEC=20000000\nWATCHDOG=1");
   notice.stopping();
   EXPECT_EQ(supervisor.heard(), "STOPPING=1");
+}
+
+TEST(ServiceNotice, asks_a_supervisor_that_watches_for_patience_and_gives_it_back) {
+  const Supervisor supervisor;
+  ServiceNotice().allow_silence(std::chrono::seconds(20));
+  EXPECT_EQ(supervisor.heard(), "nothing") << "it does not watch";
+  setenv("WATCHDOG_USEC", "3000000", 1);
+  const ServiceNotice notice;
+  notice.allow_silence(std::chrono::seconds(20));
+  EXPECT_EQ(supervisor.heard(), "WATCHDOG_USEC=20000000\nWATCHDOG=1");
+  notice.allow_silence(std::chrono::seconds(1));
+  EXPECT_EQ(supervisor.heard(), "WATCHDOG_USEC=3000000\nWATCHDOG=1");
+  notice.allow_usual_silence();
+  EXPECT_EQ(supervisor.heard(), "WATCHDOG_USEC=3000000\nWATCHDOG=1");
+  unsetenv("WATCHDOG_USEC");
 }
 
 TEST(ServiceNotice, does_nothing_without_a_supervisor_or_when_it_is_gone) {

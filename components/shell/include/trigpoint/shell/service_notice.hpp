@@ -24,11 +24,12 @@ class ServiceNotice {
 
   void alive() const { send("WATCHDOG=1"); }
 
-  /// From now on silence may last this long before it counts as hanging.
-  void allow_silence(std::chrono::seconds longest) const {
-    send("WATCHDOG_USEC=" + std::to_string(std::chrono::microseconds(longest).count()) +
-         "\nWATCHDOG=1");
-  }
+  /// From now on silence may last this long before it counts as hanging. Nothing is asked of a
+  /// supervisor that does not watch (no WATCHDOG_USEC), nor less than it allows anyhow.
+  void allow_silence(std::chrono::microseconds longest) const;
+
+  /// As before allow_silence().
+  void allow_usual_silence() const { allow_silence(usual_silence_); }
 
   /// What follows may take long.
   void stopping() const { send("STOPPING=1"); }
@@ -38,6 +39,7 @@ class ServiceNotice {
 
   std::string address_;  ///< of the supervisor; empty: none
   int socket_{-1};
+  std::chrono::microseconds usual_silence_{0};  ///< the supervisor's; 0: it does not watch
 };
 
 }  // namespace trigpoint::shell
