@@ -96,6 +96,8 @@ struct FusionGate::Impl {
   void publish(const Odometry& odometry, const Pose& unchanged, Output& out);
   bool has_odom_jumped(const Odometry& odometry);
   Odometry with_covariance_in_local_map(const Odometry& odometry) const;
+  bool can_be_published(const Odometry& odometry) const;
+  void keep_motion(bool goes_on);
   Pose as_predicted(Nanoseconds stamp_ns, const Pose& otherwise) const;
 
   // --- status

@@ -83,6 +83,22 @@ TEST_F(TwoFiltersWithoutLio, hands_over_within_half_a_second_and_without_a_step)
   EXPECT_NEAR(last_->T_frame_child.p.y(), kApart_m, 1e-3) << "the new one is followed in the end";
 }
 
+TEST_F(TwoFiltersWithoutLio,
+       hand_over_and_back_at_once_without_taking_their_difference_for_motion) {
+  gate_.on_datum(datum_);
+  for (int k = 0; k < 25 * static_cast<int>(kRate_hz); ++k) {
+    const double now_s = k / kRate_hz;
+    if (now_s < kDies_s || now_s > kDies_s + 0.3) {
+      say("a", now_s, 0.0);
+    }
+    if (now_s < kDies_s + 0.29) {
+      say("b", now_s, kApart_m);
+    }
+  }
+  EXPECT_LT(handed_over_s_, kHandOver_s);
+  EXPECT_LT(worst_step_per_message_m_, kStep_m);
+}
+
 TEST_F(TwoFiltersWithoutLio, are_not_led_astray_by_the_last_twist_of_the_one_that_fails) {
   gate_.on_datum(datum_);
   for (int k = 0; k < 25 * static_cast<int>(kRate_hz); ++k) {
