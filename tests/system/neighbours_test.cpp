@@ -158,10 +158,9 @@ std::string datum_on_the_bus() {
 class DatumTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    tests::write_file(
-        folder_.path("datum.yaml"),
-        "gps_odometry:\n  use_configured_datum: true\n  datum_latitude_deg: 49.0\n"
-        "  datum_longitude_deg: 8.0\n  datum_height_m: 110.0\n");
+    tests::write_file(folder_.path("datum.yaml"),
+                      "gps_odometry:\n  use_configured_datum: true\n  datum_latitude_deg: 49.0\n"
+                      "  datum_longitude_deg: 8.0\n  datum_height_m: 110.0\n");
     std::filesystem::create_directory(folder_.path("session"));
   }
 
