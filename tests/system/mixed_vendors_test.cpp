@@ -32,7 +32,8 @@ const std::vector<std::string> kPrograms{"trigpoint",
                                          "trigpoint_gps_ekf15",
                                          "trigpoint_gps_eskf18",
                                          "trigpoint_lio_mapper",
-                                         "trigpoint_fusion_gate"};
+                                         "trigpoint_fusion_gate",
+                                         "trigpoint_supervise"};
 
 /// The programs of the vendor that this build is not for; nothing when there is none.
 fs::path other_vendor() {

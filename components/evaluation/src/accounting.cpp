@@ -226,8 +226,10 @@ namespace {
 std::string conclude(const SessionData& data, const Accounting& found) {
   if (!found.losses.empty()) {
     return std::string("\nNOT ALL ACCOUNTED FOR") +
-           (data.interrupted() ? ", because the run was interrupted by the user" : "") + ":\n\n" +
-           list_of(found.losses) + list_of(found.refusals);
+           (data.interrupted()       ? ", because the run was interrupted by the user"
+            : !data.restarts.empty() ? ", because processes were down for a while (see Restarts)"
+                                     : "") +
+           ":\n\n" + list_of(found.losses) + list_of(found.refusals);
   }
   if (!found.counted) {
     return "\nNobody counted what was published: nothing can be said about losses.\n";

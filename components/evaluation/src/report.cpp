@@ -67,7 +67,8 @@ std::string refusal_of_all(const SessionData& data) {
 /// Fixes that no alignment came of are a failure; without fixes nobody expects one.
 std::vector<std::string> find_failures(const SessionData& data, const Accounting& found) {
   std::vector<std::string> failures;
-  if (!found.losses.empty() && !data.interrupted()) {
+  // What was on its way while a process was down is listed under Restarts.
+  if (!found.losses.empty() && !data.interrupted() && data.restarts.empty()) {
     failures.push_back("Not all messages are accounted for: " + found.losses.front() +
                        (found.losses.size() > 1 ? ", and more (see Messages)." : "."));
   }
@@ -99,9 +100,10 @@ ReportResult write_report(const std::string& session_folder, const ReportOptions
     draw_all(data, options, result);
   }
   result.text = print_list("Failed", result.failures) + print_list("Problems", result.problems) +
-                print_run(data) + "\n## Errors\n\n" + print_scores(data, score_session(data)) +
-                "\n" + print_alignment(data) + "\n" + print_gate(data) + "\n" + print_times(data) +
-                "\n" + print_accounting(data, found) + "\n" + print_map(data);
+                print_run(data) + "\n" + print_restarts(data) + "## Errors\n\n" +
+                print_scores(data, score_session(data)) + "\n" + print_alignment(data) + "\n" +
+                print_gate(data) + "\n" + print_times(data) + "\n" + print_accounting(data, found) +
+                "\n" + print_map(data);
   result.report_file = data.path(file::kReport);
   exporter::write_text(
       result.report_file,

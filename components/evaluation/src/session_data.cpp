@@ -19,6 +19,8 @@ namespace {
 namespace fs = std::filesystem;
 namespace file = exporter::session_file;
 
+/// Of trigpoint_supervise.
+constexpr const char* kRestarts = "restarts.csv";
 constexpr double kUsualIntervals = 2.5;
 /// Data are printed to 1e-9 degree and 1e-4 m.
 constexpr double kSameDatum_m = 0.001;
@@ -65,6 +67,9 @@ void load_logs(SessionData& data) {
   });
   load(data, file::kScans, Need::kExpected, [&](const auto& path) {
     data.scans = exporter::read_scans(path);
+  });
+  load(data, kRestarts, Need::kOptional, [&](const auto& path) {
+    data.restarts = read_restarts(path);
   });
 }
 

@@ -6,6 +6,7 @@
 #include "trigpoint/evaluation/report.hpp"
 #include "trigpoint/export/session.hpp"
 
+#include "restarts.hpp"
 #include <Eigen/Core>
 
 #include <optional>
@@ -38,6 +39,7 @@ struct SessionData {
   std::vector<GpsStatus> gps_status;
   std::vector<exporter::LoggedScan> scans;
   std::vector<ProgramCounts> counts;
+  std::vector<Restart> restarts;
   std::int64_t datum_fixes{10};  ///< that an election takes, of the session's configuration
   Eigen::Vector3d antenna_position_base_m{Eigen::Vector3d::Zero()};
 

@@ -9,7 +9,10 @@
 #include "trigpoint/bus/topics.hpp"
 #include "trigpoint/fusion_gate/fusion_gate.hpp"
 #include "trigpoint/pipeline/session_parts.hpp"
+#include "trigpoint/shell/service_notice.hpp"
 #include "trigpoint/shell/shell.hpp"
+
+#include "only_one.hpp"
 
 #include <chrono>
 #include <optional>
@@ -52,10 +55,14 @@ class Process {
         selected_(participant_, topics::gps_selected),
         datum_(participant_, topics::datum),
         tf_(participant_, topics::tf),
-        diagnostics_(participant_, topics::diagnostics) {
+        diagnostics_(participant_, topics::diagnostics),
+        only_one_(participant_, loop, "fusion_gate", log) {
     if (!options.session.empty()) {
       exporter::create_session_folder(options.session);
-      session_.emplace(options.session);
+      session_.emplace(options.session, exporter::Opening::kContinue);
+      if (const auto stored = pipeline::stored_datum(options.session)) {
+        adopt(*stored);
+      }
     }
     subscribe_to_sensors(settings.robot, loop);
     subscribe_to_estimates(loop);
@@ -67,7 +74,8 @@ class Process {
     keep([&] { session_->close(); });
   }
 
-  bool failed() const { return disk_.failed(); }
+  /// After close(). 2: there is another one, which no restart changes.
+  int exit_code() const { return only_one_.is_too_many() ? 2 : disk_.failed() ? 1 : 0; }
 
  private:
   void subscribe_to_sensors(const RobotConfig& robot, bus::Loop& loop) {
@@ -178,6 +186,7 @@ class Process {
 
   void report_health() {
     record_alignment();
+    keep([&] { session_->keep_counts(); });
     const bus::Diagnostic line{
         last_.aligned ? bus::DiagnosticLevel::kOk : bus::DiagnosticLevel::kWarning,
         "fusion_gate: fixes",
@@ -217,6 +226,7 @@ class Process {
   bus::Publisher<sensor_msgs::msg::NavSatFix> datum_;
   bus::Publisher<tf2_msgs::msg::TFMessage> tf_;
   bus::Publisher<diagnostic_msgs::msg::DiagnosticArray> diagnostics_;
+  shell::OnlyOne only_one_;
   std::optional<bus::Subscription<sensor_msgs::msg::NavSatFix>> datums_;
   std::optional<bus::Subscription<sensor_msgs::msg::NavSatFix>> fixes_;
   std::optional<bus::Subscription<nav_msgs::msg::Odometry>> gps_;
@@ -230,10 +240,14 @@ int run(const shell::Options& options, const shell::EventLog& log) {
   const Settings settings = load(options);
   bus::Loop loop;
   Process process(settings, options, log, loop);
+  const shell::ServiceNotice notice;
+  loop.every(shell::ServiceNotice::kPeriod, [&notice] { notice.alive(); });
+  notice.ready();
   log.info("ready");
   loop.run();
+  notice.stopping();
   process.close();
-  return process.failed() ? 1 : 0;
+  return process.exit_code();
 }
 
 }  // namespace

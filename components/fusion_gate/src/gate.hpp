@@ -96,6 +96,8 @@ struct FusionGate::Impl {
   void publish(const Odometry& odometry, const Pose& unchanged, Output& out);
   bool has_odom_jumped(const Odometry& odometry);
   Odometry with_covariance_in_local_map(const Odometry& odometry) const;
+  bool can_be_published(const Odometry& odometry) const;
+  void keep_motion(bool goes_on);
   Pose as_predicted(Nanoseconds stamp_ns, const Pose& otherwise) const;
 
   // --- status
@@ -158,7 +160,9 @@ struct FusionGate::Impl {
   // --- what fusion/odometry rested on last
   enum class Carrier { kLio, kGps };
   std::optional<Odometry> last_raw;
+  std::deque<Odometry> recent_raw;  // up to last_raw: how the robot moves
   std::optional<Carrier> last_carrier;
+  std::string last_gps_writer;  // of the GPS odometry that carried
   std::uint32_t last_epoch{0};
   std::optional<Odometry> last_odom;
   std::optional<Nanoseconds> odom_jumped_at_status_ns;

@@ -17,6 +17,9 @@ constexpr double kDefaultFixInterval_s = 1.0;
 constexpr double kHighestSpeed_mps = 60.0;
 constexpr double kGpsStep_m = 0.5;  // a GPS filter was set anew: more than corrections at 5 Hz move
 
+constexpr double kMotion_s = 0.5;       // over which the robot's motion is seen
+constexpr double kLeastMotion_s = 0.1;  // for less, the twist
+
 }  // namespace
 
 bool FusionGate::Impl::lio_carries() const {
@@ -102,8 +105,15 @@ bool FusionGate::Impl::has_odom_jumped(const Odometry& odometry) {
   return odom_jumped_at_status_ns.has_value();
 }
 
+/// What is not published has not taken over: a mapper that comes back begins behind what GPS
+/// carried meanwhile.
+bool FusionGate::Impl::can_be_published(const Odometry& odometry) const {
+  const bool finite = odometry.T_frame_child.is_finite() && odometry.pose_covariance.allFinite();
+  return finite && (!last_fused_ns || odometry.stamp_ns > *last_fused_ns);
+}
+
 void FusionGate::Impl::publish_lio(const Odometry& odometry, Output& out) {
-  if (!lio_carries() || has_odom_jumped(odometry)) {
+  if (!lio_carries() || has_odom_jumped(odometry) || !can_be_published(odometry)) {
     return;
   }
   const Odometry in_map =
@@ -111,6 +121,7 @@ void FusionGate::Impl::publish_lio(const Odometry& odometry, Output& out) {
   const bool goes_on = last_carrier == Carrier::kLio && last_epoch == lio->odom_epoch;
   const Pose unchanged = goes_on ? last_T_map_odom.pose() * odometry.T_frame_child
                                  : as_predicted(odometry.stamp_ns, in_map.T_frame_child);
+  keep_motion(goes_on);
   last_carrier = Carrier::kLio;
   last_epoch = lio->odom_epoch;
   last_T_map_odom = lio->T_map_odom;
@@ -119,34 +130,61 @@ void FusionGate::Impl::publish_lio(const Odometry& odometry, Output& out) {
 
 void FusionGate::Impl::publish_gps(Output& out) {
   const std::optional<Odometry> gps = gps_carries() ? gps_in_map() : std::nullopt;
-  if (!gps) {
+  if (!gps || !can_be_published(*gps)) {
     return;
   }
   const Odometry base = move_to_base(*gps, robot.antenna_position_base_m);
   const Pose predicted = as_predicted(base.stamp_ns, base.T_frame_child);
   const bool steps = (predicted.p - base.T_frame_child.p).norm() > kGpsStep_m;
-  const bool goes_on = last_carrier == Carrier::kGps && !steps;
+  const bool same_filter = last_gps_writer == sources.followed();
+  const bool goes_on = last_carrier == Carrier::kGps && same_filter && !steps;
+  keep_motion(goes_on);
   last_carrier = Carrier::kGps;
+  last_gps_writer = sources.followed();
   publish(base, goes_on ? base.T_frame_child : predicted, out);
 }
 
-/// Where the last raw pose and its twist lead; `otherwise` when there is none.
+/// Where another source carries on, or the same one was set anew, the way from its predecessor's
+/// pose to its own is no motion.
+void FusionGate::Impl::keep_motion(bool goes_on) {
+  if (!goes_on) {
+    recent_raw.clear();
+  }
+}
+
+/// Where the last raw poses lead; `otherwise` when there is none. By their displacement: the twist
+/// of a single one, as of a LIO that has just lost its track, may be anything.
 Pose FusionGate::Impl::as_predicted(Nanoseconds stamp_ns, const Pose& otherwise) const {
   if (!last_raw) {
     return otherwise;
   }
+  const Pose& last = last_raw->T_frame_child;
+  const Pose& first = recent_raw.empty() ? last : recent_raw.front().T_frame_child;
   const double dt_s = to_seconds(stamp_ns - last_raw->stamp_ns);
-  return last_raw->T_frame_child *
-         Pose{so3_exp(last_raw->angular_radps * dt_s), last_raw->linear_mps * dt_s};
+  const double known_s =
+      recent_raw.empty() ? 0.0 : to_seconds(last_raw->stamp_ns - recent_raw.front().stamp_ns);
+  if (known_s < kLeastMotion_s) {
+    return last * Pose{so3_exp(last_raw->angular_radps * dt_s), last_raw->linear_mps * dt_s};
+  }
+  const double share = dt_s / known_s;
+  const Eigen::Vector3d turned_rad = so3_log(first.q.conjugate() * last.q);
+  // On an arc a chord lies half way between the headings at its ends.
+  const Eigen::Quaterniond past_to_coming_chord = so3_exp(0.5 * (1.0 + share) * turned_rad);
+  const Eigen::Vector3d moved_first_m = first.q.conjugate() * (last.p - first.p);
+  return {(last.q * so3_exp(share * turned_rad)).normalized(),
+          last.p + share * (first.q * (past_to_coming_chord * moved_first_m))};
 }
 
 void FusionGate::Impl::publish(const Odometry& odometry, const Pose& unchanged, Output& out) {
-  const bool finite = odometry.T_frame_child.is_finite() && odometry.pose_covariance.allFinite();
-  if (!finite || (last_fused_ns && odometry.stamp_ns <= *last_fused_ns)) {
+  if (!can_be_published(odometry)) {
     return;
   }
   last_fused_ns = odometry.stamp_ns;
   last_raw = odometry;
+  recent_raw.push_back(odometry);
+  while (to_seconds(odometry.stamp_ns - recent_raw.front().stamp_ns) > kMotion_s) {
+    recent_raw.pop_front();
+  }
   out.fused_raw = odometry;
   out.fused = mode == Mode::kSmooth ? hand_over.follow(odometry, unchanged) : odometry;
 }

@@ -10,6 +10,7 @@
 #include "trigpoint/bus/topics.hpp"
 #include "trigpoint/gps_odometry/gps_odometry.hpp"
 #include "trigpoint/pipeline/session_parts.hpp"
+#include "trigpoint/shell/service_notice.hpp"
 #include "trigpoint/shell/shell.hpp"
 
 #include "other_filters.hpp"
@@ -71,7 +72,10 @@ class Process {
         diagnostics_(participant_, topics::diagnostics) {
     if (!options.session.empty()) {
       exporter::create_session_folder(options.session);
-      session_.emplace(options.session);
+      session_.emplace(options.session, exporter::Opening::kContinue);
+      if (const auto stored = pipeline::stored_datum(options.session)) {
+        take(core_.on_datum(*stored));
+      }
     }
     publish_datum();
     datums_.emplace(
@@ -101,7 +105,7 @@ class Process {
   }
 
   void close() {
-    keep([&] { session_->close(core_.status()); });
+    keep([&] { session_->keep_counts(core_.status()); });
   }
 
   bool failed() const { return disk_.failed(); }
@@ -213,6 +217,7 @@ class Process {
                                last_.source,
                                {{"datum", last_.datum_id}}};
     diagnostics_.publish(bus::to_message(last_.stamp_ns, {&line, 1}));
+    keep([&] { session_->keep_counts(core_.status()); });
   }
 
   shell::EventLog log_;
@@ -242,8 +247,12 @@ int run(const shell::Options& options, const shell::EventLog& log) {
   const Settings settings = load(options);
   bus::Loop loop;
   Process process(settings, options, log, loop);
+  const shell::ServiceNotice notice;
+  loop.every(shell::ServiceNotice::kPeriod, [&notice] { notice.alive(); });
+  notice.ready();
   log.info("ready");
   loop.run();
+  notice.stopping();
   process.close();
   return process.failed() ? 1 : 0;
 }

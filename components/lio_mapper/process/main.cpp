@@ -11,9 +11,11 @@
 #include "trigpoint/lio_mapper/lio_mapper.hpp"
 #include "trigpoint/pipeline/past_beside.hpp"
 #include "trigpoint/pipeline/session_parts.hpp"
+#include "trigpoint/shell/service_notice.hpp"
 #include "trigpoint/shell/shell.hpp"
 
 #include "decode_ahead.hpp"
+#include "only_one.hpp"
 
 #include <chrono>
 #include <memory>
@@ -32,6 +34,10 @@ constexpr std::size_t kUnwrittenScans = 100;
 
 /// The correction of the past takes what the odometry leaves.
 constexpr int kPastNiceness = 10;
+
+/// Silence that a supervisor is asked for: finding the place in the map again is one long piece of
+/// work.
+constexpr std::chrono::seconds kSearching{20};
 
 constexpr std::chrono::seconds kMapPeriod{5};  ///< the latched local map, while somebody listens
 
@@ -72,8 +78,10 @@ class Process {
   Process(const Settings& settings,
           const shell::Options& options,
           const shell::EventLog& log,
-          bus::Loop& loop)
+          bus::Loop& loop,
+          const shell::ServiceNotice& notice)
       : log_(log),
+        notice_(notice),
         disk_(log),
         core_(settings.mapper, settings.robot),
         decoding_(settings.mapper, kDecodedClouds),
@@ -85,7 +93,8 @@ class Process {
         map_(participant_, topics::map),
         tf_(participant_, topics::tf),
         tf_static_(participant_, topics::tf_static),
-        diagnostics_(participant_, topics::diagnostics) {
+        diagnostics_(participant_, topics::diagnostics),
+        only_one_(participant_, loop, "lio_mapper", log) {
     if (!options.session.empty()) {
       exporter::create_session_folder(options.session);
       open_session(options.session);
@@ -140,8 +149,8 @@ class Process {
     writing_.finish();
   }
 
-  /// After close().
-  bool failed() const { return disk_.failed(); }
+  /// After close(). 2: there is another one, which no restart changes.
+  int exit_code() const { return only_one_.is_too_many() ? 2 : disk_.failed() ? 1 : 0; }
 
  private:
   /// A session that holds a checkpoint is one in which this program died or was stopped: it goes
@@ -169,8 +178,17 @@ class Process {
     }
   }
 
+  void ask_for_patience() {
+    const bool searching = core_.status().health != LioHealth::kOk;
+    if (searching != searching_) {
+      searching_ = searching;
+      searching ? notice_.allow_silence(kSearching) : notice_.allow_usual_silence();
+    }
+  }
+
   template <typename Feed>
   void take(Feed feed) {
+    ask_for_patience();
     const Clock::time_point before = Clock::now();
     lio_mapper::Output output = feed();
     const double elapsed_ms =
@@ -266,6 +284,8 @@ class Process {
   }
 
   shell::EventLog log_;
+  const shell::ServiceNotice& notice_;
+  bool searching_{false};
   shell::DiskGuard disk_;  ///< used by the writing thread
   lio_mapper::LioMapper core_;
   lio_mapper::DecodeAhead decoding_;
@@ -282,6 +302,7 @@ class Process {
   bus::Publisher<tf2_msgs::msg::TFMessage> tf_;
   bus::Publisher<tf2_msgs::msg::TFMessage> tf_static_;
   bus::Publisher<diagnostic_msgs::msg::DiagnosticArray> diagnostics_;
+  shell::OnlyOne only_one_;
   std::optional<bus::Subscription<trigpoint_msgs::msg::StateUpdate>> updates_;
   std::optional<bus::Subscription<sensor_msgs::msg::Imu>> imu_;
   std::optional<bus::Subscription<sensor_msgs::msg::PointCloud2>> points_;
@@ -292,11 +313,15 @@ class Process {
 int run(const shell::Options& options, const shell::EventLog& log) {
   const Settings settings = load(options);
   bus::Loop loop;
-  Process process(settings, options, log, loop);
+  const shell::ServiceNotice notice;
+  Process process(settings, options, log, loop, notice);
+  loop.every(shell::ServiceNotice::kPeriod, [&notice] { notice.alive(); });
+  notice.ready();
   log.info("ready");
   loop.run();
+  notice.stopping();
   process.close();
-  return process.failed() ? 1 : 0;
+  return process.exit_code();
 }
 
 }  // namespace

@@ -120,6 +120,9 @@ void LioMapper::Impl::start_when_possible(Output& output) {
     refuse_front(
         *objection_to(sweeps.front()), "refused a sweep that the IMU does not cover", output);
   }
+  if (resumption && resume_at_once(output)) {
+    return;
+  }
   if (can_start(config.start, imu, sweeps)) {
     begin(output);
   }

@@ -48,6 +48,8 @@ struct LioMapper::Impl {
   void process_what_is_covered(Output& output);
   void start_when_possible(Output& output);
   void begin(Output& output);
+  bool resume_at_once(Output& output);
+  void go_on_from(Resumption::Found found, Output& output);
   bool resume_from(const StartResult& result, Output& output);
   void begin_epoch_anew(const std::string& code, const std::string& why, Output& output);
   void update_map(const ScanOutcome& outcome);

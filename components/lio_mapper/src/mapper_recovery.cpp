@@ -39,6 +39,13 @@ void LioMapper::Impl::begin_epoch_anew(const std::string& code,
                            "odom epoch " + std::to_string(status.odom_epoch) + " begins: " + why});
 }
 
+bool LioMapper::Impl::resume_at_once(Output& output) {
+  if (auto found = resumption->attempt_at_once(T_base_lidar, imu, sweeps)) {
+    go_on_from(std::move(*found), output);
+  }
+  return !resumption;
+}
+
 /// False while another attempt may come.
 bool LioMapper::Impl::resume_from(const StartResult& result, Output& output) {
   auto found = resumption->attempt(result, T_base_lidar, imu, sweeps);
@@ -48,14 +55,18 @@ bool LioMapper::Impl::resume_from(const StartResult& result, Output& output) {
     }
     return false;
   }
-  filter.emplace(config, T_base_lidar, found->initial, [this](Stage s) { begin_stage(s); });
-  filter->take_over(std::move(found->past));
-  loaded_at_m = found->initial.state.T_odom_base.p;
-  last_used_ns = found->initial.stamp_ns;
+  go_on_from(std::move(*found), output);
+  return true;
+}
+
+void LioMapper::Impl::go_on_from(Resumption::Found found, Output& output) {
+  filter.emplace(config, T_base_lidar, found.initial, [this](Stage s) { begin_stage(s); });
+  filter->take_over(std::move(found.past));
+  loaded_at_m = found.initial.state.T_odom_base.p;
+  last_used_ns = found.initial.stamp_ns;
   resumption.reset();
   output.events.push_back(
-      {Severity::kInfo, found->initial.stamp_ns, "lio_resumed", "odom goes on, " + found->text});
-  return true;
+      {Severity::kInfo, found.initial.stamp_ns, "lio_resumed", "odom goes on, " + found.text});
 }
 
 /// A frozen map is loaded around the robot as that moves.

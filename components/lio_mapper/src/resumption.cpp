@@ -23,6 +23,11 @@ constexpr std::size_t kSweepsBetweenAttempts = 5;
 constexpr std::size_t kMostSweeps = 20;  // that are put together for a registration
 /// A robot that was restarted while it drove has gone on at most this long at its speed.
 constexpr double kLongestDrive_s = 5.0;
+/// For so long a robot goes on as it went: attitude to the last scan's, speed by an acceleration.
+constexpr double kMoment_s = 2.0;
+constexpr std::size_t kSweepsAtOnce = 2;
+constexpr double kAcceleration_mps2 = 1.0;
+constexpr double kVelocitySigma_mps = 0.2;
 /// The heading's rate while nobody looked is taken from so much of the IMU after it.
 constexpr double kTurnWindow_s = 0.2;
 constexpr double kTurned_rad = 0.2;
@@ -153,18 +158,53 @@ std::vector<SearchArea> Resumption::areas(Nanoseconds now_ns,
     result.push_back({{place * T_first_newest}, radius_m, yaw_rad});
   }
   const Pose& last = checkpoint_.T_odom_base;
-  SearchArea at_checkpoint{{last * T_first_newest}, radius_m, yaw_rad};
   const double away_s = std::max(0.0, to_seconds(now_ns - checkpoint_.stamp_ns));
   const Vector3d driven_m = away_s * checkpoint_.v_odom_mps;
   const double turned_rad = away_s * turn_radps;
+  SearchArea at_checkpoint{{last * T_first_newest}, radius_m, yaw_rad};
   if (away_s < kLongestDrive_s && (driven_m.norm() > 1.0 || std::abs(turned_rad) > kTurned_rad)) {
-    // Along an arc, whose chord points half way between the headings.
-    const Pose predicted((from_yaw(turned_rad) * last.q).normalized(),
-                         last.p + from_yaw(0.5 * turned_rad) * driven_m);
-    at_checkpoint.centres_odom.push_back(predicted * T_first_newest);
+    const SearchArea predicted = predicted_place(now_ns, turn_radps, T_first_newest);
+    at_checkpoint.centres_odom.push_back(predicted.centres_odom.front());
   }
   result.push_back(std::move(at_checkpoint));
   return result;
+}
+
+SearchArea Resumption::predicted_place(Nanoseconds now_ns,
+                                       double turn_radps,
+                                       const Pose& T_first_newest) const {
+  const Pose& last = checkpoint_.T_odom_base;
+  const double away_s = std::max(0.0, to_seconds(now_ns - checkpoint_.stamp_ns));
+  const Vector3d driven_m = away_s * checkpoint_.v_odom_mps;
+  const double turned_rad = away_s * turn_radps;
+  // Along an arc, whose chord points half way between the headings.
+  const Pose predicted((from_yaw(turned_rad) * last.q).normalized(),
+                       last.p + from_yaw(0.5 * turned_rad) * driven_m);
+  return {{predicted * T_first_newest}, 0.0, 0.0};
+}
+
+/// A start that takes attitude, speed and biases from the checkpoint, in level axes of its own.
+StartResult Resumption::going_on(Nanoseconds stamp_ns) const {
+  const Quaterniond q_own_odom = from_yaw(-yaw_of(checkpoint_.T_odom_base.q));
+  const Quaterniond q_own_base = (q_own_odom * checkpoint_.T_odom_base.q).normalized();
+  const Vector3d gravity_own_mps2 = q_own_odom * checkpoint_.gravity_odom_mps2;
+  StartResult start;
+  start.initial = level(checkpoint_.accel_bias_mps2 - q_own_base.conjugate() * gravity_own_mps2,
+                        stamp_ns,
+                        config_.imu,
+                        {});
+  State& state = start.initial.state;
+  state.T_odom_base = {q_own_base, Vector3d::Zero()};
+  state.gravity_odom_mps2 = gravity_own_mps2;
+  state.v_odom_mps = q_own_odom * checkpoint_.v_odom_mps;
+  state.gyro_bias_radps = checkpoint_.gyro_bias_radps;
+  state.accel_bias_mps2 = checkpoint_.accel_bias_mps2;
+  const double sigma_mps =
+      kVelocitySigma_mps + kAcceleration_mps2 * to_seconds(stamp_ns - checkpoint_.stamp_ns);
+  start.initial.covariance.block<3, 3>(error::kVelocity, error::kVelocity) =
+      sigma_mps * sigma_mps * Matrix3d::Identity();
+  start.speed_mps = state.v_odom_mps.norm();
+  return start;
 }
 
 Resumption::Found Resumption::compose(const StartResult& start,
@@ -216,11 +256,42 @@ std::optional<Resumption::Found> Resumption::attempt(const StartResult& start,
   next_at_ = sweeps.size() + kSweepsBetweenAttempts;
   const Gathered gathered = gather(config_, start.initial, T_base_lidar, imu, sweeps);
   const LevelScan scan{gathered.points_base, without_yaw(gathered.T_new_base.q), T_base_lidar.p};
-  Workers workers(static_cast<std::size_t>(config_.matching.threads));
   obstacle_.clear();
   const double turn_radps = turn_rate_radps(imu, start, checkpoint_.gyro_bias_radps);
   const Pose T_first_newest = start.initial.state.T_odom_base.inverse() * gathered.T_new_base;
-  for (const SearchArea& area : areas(start.initial.stamp_ns, turn_radps, T_first_newest)) {
+  return look_in(
+      areas(start.initial.stamp_ns, turn_radps, T_first_newest), start, scan, gathered.T_new_base);
+}
+
+std::optional<Resumption::Found> Resumption::attempt_at_once(const Pose& T_base_lidar,
+                                                             const ImuBuffer& imu,
+                                                             const std::deque<Sweep>& sweeps) {
+  const bool ready =
+      sweeps.size() >= kSweepsAtOnce && sweeps[kSweepsAtOnce - 1].end_ns <= imu.newest_ns();
+  if (tried_at_once_ || !ready || options_.frozen_map || !options_.more_places_odom.empty()) {
+    return std::nullopt;
+  }
+  tried_at_once_ = true;
+  const Nanoseconds stamp_ns = std::max(imu.oldest_ns(), sweeps.front().begin_ns);
+  const double away_s = to_seconds(stamp_ns - checkpoint_.stamp_ns);
+  if (away_s < 0.0 || away_s > kMoment_s) {
+    return std::nullopt;
+  }
+  const StartResult start = going_on(stamp_ns);
+  const Gathered gathered = gather(config_, start.initial, T_base_lidar, imu, sweeps);
+  const LevelScan scan{gathered.points_base, without_yaw(gathered.T_new_base.q), T_base_lidar.p};
+  const double turn_radps = turn_rate_radps(imu, start, checkpoint_.gyro_bias_radps);
+  const Pose T_first_newest = start.initial.state.T_odom_base.inverse() * gathered.T_new_base;
+  return look_in(
+      {predicted_place(stamp_ns, turn_radps, T_first_newest)}, start, scan, gathered.T_new_base);
+}
+
+std::optional<Resumption::Found> Resumption::look_in(const std::vector<SearchArea>& areas,
+                                                     const StartResult& start,
+                                                     const LevelScan& scan,
+                                                     const Pose& T_new_base) {
+  Workers workers(static_cast<std::size_t>(config_.matching.threads));
+  for (const SearchArea& area : areas) {
     auto map = load_map(config_.local_map,
                         points_,
                         checkpoint_.odom_epoch,
@@ -229,7 +300,7 @@ std::optional<Resumption::Found> Resumption::attempt(const StartResult& start,
     const RegistrationResult result =
         register_scan(scan, *map, area, config_.matching, config_.recovery, workers);
     if (result.accepted) {
-      const Pose T_old_new = result.best->T_odom_base * gathered.T_new_base.inverse();
+      const Pose T_old_new = result.best->T_odom_base * T_new_base.inverse();
       return compose(start, T_old_new, *result.best, std::move(map));
     }
     obstacle_ += (obstacle_.empty() ? "" : "; elsewhere: ") + result.obstacle;

@@ -49,6 +49,12 @@ class Resumption {
                                const ImuBuffer& imu,
                                const std::deque<Sweep>& sweeps);
 
+  /// Tried once, before an ordinary start is possible, by who was away for a moment only: the robot
+  /// goes on as it went, and must be found where that leads.
+  std::optional<Found> attempt_at_once(const Pose& T_base_lidar,
+                                       const ImuBuffer& imu,
+                                       const std::deque<Sweep>& sweeps);
+
   bool has_given_up() const { return attempts_ >= config_.recovery.attempts; }
 
   /// Why the last attempt failed.
@@ -60,6 +66,14 @@ class Resumption {
   std::vector<SearchArea> areas(Nanoseconds now_ns,
                                 double turn_radps,
                                 const Pose& T_first_newest) const;
+  SearchArea predicted_place(Nanoseconds now_ns,
+                             double turn_radps,
+                             const Pose& T_first_newest) const;
+  StartResult going_on(Nanoseconds stamp_ns) const;
+  std::optional<Found> look_in(const std::vector<SearchArea>& areas,
+                               const StartResult& start,
+                               const LevelScan& scan,
+                               const Pose& T_new_base);
   Found compose(const StartResult& start,
                 const Pose& T_old_new,
                 const Registration& registration,
@@ -69,6 +83,7 @@ class Resumption {
   Checkpoint checkpoint_;
   StoredPoints points_;
   ResumeOptions options_;
+  bool tried_at_once_{false};
   std::int64_t attempts_{0};
   std::size_t next_at_{0};
   std::string obstacle_;

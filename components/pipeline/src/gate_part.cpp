@@ -44,11 +44,15 @@ void GatePart::write_alignment(const exporter::AlignmentRecord& record) {
   written_ns_ = last_.stamp_ns;
 }
 
+void GatePart::keep_counts() {
+  counts_.write(exporter::counts_of(last_));
+}
+
 void GatePart::close() {
   if (newest_alignment_) {
     write_alignment(*newest_alignment_);
   }
-  counts_.write(exporter::counts_of(last_));
+  keep_counts();
 }
 
 }  // namespace trigpoint::pipeline

@@ -25,7 +25,7 @@ void GpsPart::on_datum(const Datum& datum) {
   exporter::write_datum(path_in(session_, file::kDatum), datum);
 }
 
-void GpsPart::close(const GpsStatus& status) {
+void GpsPart::keep_counts(const GpsStatus& status) {
   counts_.write(exporter::counts_of(status));
 }
 

@@ -82,7 +82,7 @@ class Session {
     keep_datum(cores);
     keep_alignment(cores);
     disk_.finish();
-    gps_.close(cores.gps_status());
+    gps_.keep_counts(cores.gps_status());
     mapper_.close(cores.lio_status(), cores.checkpoint(), cores.take_rows());
     gate_.close();
     log_.close(log);

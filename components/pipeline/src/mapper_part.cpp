@@ -18,6 +18,14 @@ exporter::Opening opening_of(bool goes_on) {
 
 }  // namespace
 
+std::optional<Datum> stored_datum(const std::string& session) {
+  const std::string datum = path_in(session, file::kDatum);
+  if (!std::filesystem::exists(datum)) {
+    return std::nullopt;
+  }
+  return exporter::read_datum(datum);
+}
+
 std::optional<lio_mapper::Checkpoint> stored_checkpoint(const std::string& session) {
   const std::string store = path_in(session, file::kKeyframes);
   if (!std::filesystem::exists(store)) {
@@ -42,9 +50,7 @@ StoredSession open_stored_session(const std::string& session) {
   stored.checkpoint = *checkpoint;
   stored.points = lio_mapper::stored_points_of(store);
   stored.first_pose = reader.first_pose(checkpoint->odom_epoch);
-  if (std::filesystem::exists(path_in(session, file::kDatum))) {
-    stored.datum = exporter::read_datum(path_in(session, file::kDatum));
-  }
+  stored.datum = stored_datum(session);
   return stored;
 }
 

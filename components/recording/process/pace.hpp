@@ -4,12 +4,13 @@
 
 #include "trigpoint/base/messages.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
-#include <functional>
+#include <map>
 #include <mutex>
-#include <numeric>
+#include <string>
 
 namespace trigpoint::recording {
 
@@ -17,7 +18,8 @@ namespace trigpoint::recording {
 /// answers come on the bus's threads.
 class Pace {
  public:
-  void on_lio_status(const LioStatus& status) {
+  /// `writer`: GUID of who says it; one that is started again is another one.
+  void on_lio_status(const LioStatus& status, const std::string& writer) {
     std::uint64_t done = status.scans_used;
     for (const NamedCount& refused : status.scans_refused) {
       done += refused.count;
@@ -26,15 +28,13 @@ class Pace {
       done = status.scans_received;  // it collects sweeps until it knows where odom begins
     }
     tell([&] {
-      // `done` itself steps back when the collected sweeps begin to be worked off.
-      sweeps_.heard(done, status.scans_received < scans_received_);
-      scans_received_ = status.scans_received;
-      imu_.heard(status.imu_received);
+      sweeps_.heard(writer, done);
+      imu_.heard(writer, status.imu_received);
     });
   }
 
-  void on_gps_status(const GpsStatus& status) {
-    tell([&] { fixes_.heard(status.fixes_received); });
+  void on_gps_status(const GpsStatus& status, const std::string& writer) {
+    tell([&] { fixes_.heard(writer, status.fixes_received); });
   }
 
   void on_fusion_status(const FusionStatus& status) {
@@ -50,16 +50,24 @@ class Pace {
     });
   }
 
+  /// What has gone out so far, also when nobody is waited for.
+  void published(std::uint64_t sweeps, std::uint64_t imu, std::uint64_t fixes) {
+    const std::scoped_lock lock(mutex_);
+    sweeps_.ask(sweeps);
+    imu_.ask(imu);
+    fixes_.ask(fixes);
+  }
+
   bool wait_for_sweeps(std::uint64_t published, std::chrono::milliseconds patience) {
-    return wait(patience, [&] { return sweeps_.answered() >= published; });
+    return wait_for(sweeps_, published, patience);
   }
 
   bool wait_for_imu(std::uint64_t published, std::chrono::milliseconds patience) {
-    return wait(patience, [&] { return imu_.answered() >= published; });
+    return wait_for(imu_, published, patience);
   }
 
   bool wait_for_fixes(std::uint64_t published, std::chrono::milliseconds patience) {
-    return wait(patience, [&] { return fixes_.answered() >= published; });
+    return wait_for(fixes_, published, patience);
   }
 
   bool wait_for_verdict(Nanoseconds fix_stamp_ns, std::chrono::milliseconds patience) {
@@ -67,28 +75,46 @@ class Pace {
   }
 
  private:
-  /// A counter of another program, which starts anew when that program does.
+  /// A counter that other programs keep: the mapper, or GPS filters, one of which is enough. One
+  /// that comes later, in place of one that died or beside it, will never answer what was asked
+  /// before: that counts as answered.
   struct Answers {
-    void heard(std::uint64_t count) { heard(count, count < newest_); }
-
-    void heard(std::uint64_t count, bool started_anew) {
-      if (started_anew) {
-        before_ += newest_;
+    void heard(const std::string& writer, std::uint64_t count) {
+      const auto newest = static_cast<std::int64_t>(count);
+      const auto [known, is_new] = writers_.try_emplace(writer);
+      if (is_new && writers_.size() > 1) {
+        known->second.base = newest - asked_;
       }
-      newest_ = count;
+      known->second.newest = newest;
     }
 
-    void begin() { base_ = before_ + newest_; }
-
-    /// Not below zero: what was answered before the first message may step back, too.
-    std::uint64_t answered() const {
-      const std::uint64_t all = before_ + newest_;
-      return all > base_ ? all - base_ : 0;
+    void begin() {
+      asked_ = 0;
+      for (auto& [writer, count] : writers_) {
+        count.base = count.newest;
+      }
     }
 
-    std::uint64_t before_{0};
-    std::uint64_t newest_{0};
-    std::uint64_t base_{0};
+    void ask(std::uint64_t published) {
+      asked_ = std::max(asked_, static_cast<std::int64_t>(published));
+    }
+
+    bool has(std::uint64_t published) const {
+      return published == 0 ||
+             std::any_of(writers_.begin(), writers_.end(), [&](const auto& entry) {
+               return entry.second.newest - entry.second.base >=
+                      static_cast<std::int64_t>(published);
+             });
+    }
+
+   private:
+    struct Count {
+      std::int64_t newest{0};
+      std::int64_t base{0};
+    };
+
+    std::map<std::string, Count> writers_;
+    std::int64_t asked_{0};
   };
 
   template <typename Change>
@@ -106,12 +132,16 @@ class Pace {
     return changed_.wait_for(lock, patience, condition);
   }
 
+  bool wait_for(Answers& answers, std::uint64_t published, std::chrono::milliseconds patience) {
+    tell([&] { answers.ask(published); });
+    return wait(patience, [&] { return answers.has(published); });
+  }
+
   std::mutex mutex_;
   std::condition_variable changed_;
   Answers sweeps_;
   Answers fixes_;
   Answers imu_;
-  std::uint64_t scans_received_{0};
   Nanoseconds verdict_ns_{0};
 };
 

@@ -26,6 +26,11 @@ constexpr Nanoseconds kClockPeriod_ns = 10'000'000;
 /// A reader's history holds a thousand samples: ask well before that whether all have come.
 constexpr std::uint64_t kImuBurst = 400;
 constexpr std::chrono::milliseconds kVerdictGrace{20};
+/// For whoever keeps a process that died running.
+constexpr std::chrono::seconds kReturn{15};
+/// At a fixed rate the log does not wait for one that is slow or dead, beyond what a reader's
+/// history makes up for.
+constexpr std::chrono::milliseconds kLiveGrace{50};
 
 class Player {
  public:
@@ -38,13 +43,13 @@ class Player {
         clock_(participant_, topics::clock),
         lio_status_(participant_,
                     topics::lio_status,
-                    [this](const trigpoint_msgs::msg::LioStatus& m, const bus::MessageInfo&) {
-                      pace_.on_lio_status(bus::from_message(m));
+                    [this](const trigpoint_msgs::msg::LioStatus& m, const bus::MessageInfo& info) {
+                      pace_.on_lio_status(bus::from_message(m), info.writer_guid);
                     }),
         gps_status_(participant_,
                     topics::gps_status,
-                    [this](const trigpoint_msgs::msg::GpsStatus& m, const bus::MessageInfo&) {
-                      pace_.on_gps_status(bus::from_message(m));
+                    [this](const trigpoint_msgs::msg::GpsStatus& m, const bus::MessageInfo& info) {
+                      pace_.on_gps_status(bus::from_message(m), info.writer_guid);
                     }),
         fusion_status_(participant_,
                        topics::fusion_status,
@@ -104,6 +109,7 @@ class Player {
     publish_clock(entry.receive_ns);
     if (!entry.withheld) {
       std::visit([this](const auto& measurement) { send(measurement); }, entry.measurement);
+      pace_.published(result.sweeps, result.imu, result.fixes);
     }
   }
 
@@ -112,10 +118,10 @@ class Player {
     points_.wait_for_acknowledgments(options_.patience);
     imu_.wait_for_acknowledgments(options_.patience);
     fixes_.wait_for_acknowledgments(options_.patience);
-    await("the last sweep", lio_status_.matched(), [this] {
+    await("the last sweep", mapper_, [this] {
       return pace_.wait_for_sweeps(result.sweeps > 0 ? result.sweeps - 1 : 0, options_.patience);
     });
-    await("the last IMU sample", lio_status_.matched(), [this] {
+    await("the last IMU sample", mapper_, [this] {
       return pace_.wait_for_imu(result.imu, options_.patience);
     });
   }
@@ -133,6 +139,13 @@ class Player {
   PlayResult result;
 
  private:
+  /// Who answers to what is played, by whether we hear and are heard.
+  struct Answerer {
+    const char* name;
+    std::function<int()> matched;
+    bool was_there{false};
+  };
+
   void refuse_two_of_a_kind() const {
     const int mappers = lio_status_.matched();
     const int gates = fusion_status_.matched();
@@ -147,7 +160,7 @@ class Player {
 
   void send(const PointCloudMessage& cloud) {
     if (options_.rate == 0.0) {
-      await("a sweep", lio_status_.matched(), [this] {
+      await("a sweep", mapper_, [this] {
         return pace_.wait_for_sweeps(result.sweeps, options_.patience);
       });
       imu_burst_ = 0;
@@ -161,7 +174,7 @@ class Player {
     ++result.imu;
     if (++imu_burst_ == kImuBurst) {
       imu_burst_ = 0;
-      imu_.wait_for_acknowledgments(options_.patience);
+      imu_.wait_for_acknowledgments(options_.rate > 0.0 ? kLiveGrace : options_.patience);
     }
   }
 
@@ -183,7 +196,7 @@ class Player {
     fixes_.publish(bus::to_message(fix));
     ++result.fixes;
     if (options_.rate == 0.0) {
-      await("a fix", gps_status_.matched(), [this] {
+      await("a fix", filter_, [this] {
         return pace_.wait_for_fixes(result.fixes, options_.patience);
       });
       // The verdict of a fix that is newer than the newest sweep comes only after the next one.
@@ -194,17 +207,32 @@ class Player {
     }
   }
 
-  /// Waits for an answer if anybody is there to give it; one that never came is not waited for
-  /// again at full length.
+  /// Waits for an answer if anybody is there to give it, or was and may be started again.
   template <typename Wait>
-  void await(const char* what, int peers, Wait wait) {
-    if (peers == 0 || stop_requested() || wait()) {
+  void await(const char* what, Answerer& answerer, Wait wait) {
+    await_return(answerer);
+    if (answerer.matched() == 0 || stop_requested() || wait()) {
       return;
     }
     ++result.unanswered;
     tell("unanswered",
          std::string("no answer to ") + what + " within " +
              std::to_string(options_.patience.count()) + " ms; going on");
+  }
+
+  /// One that was there and has died may be started again: without it the log would run through.
+  void await_return(Answerer& answerer) {
+    const bool is_there = answerer.matched() > 0;
+    answerer.was_there = answerer.was_there || is_there;
+    if (is_there || !answerer.was_there || options_.rate > 0.0) {
+      return;
+    }
+    tell("gone", std::string(answerer.name) + " is gone; waiting for it to come back");
+    const auto deadline = WallClock::now() + kReturn;
+    while (answerer.matched() == 0 && WallClock::now() < deadline && !stop_requested()) {
+      std::this_thread::sleep_for(20ms);
+    }
+    answerer.was_there = answerer.matched() > 0;
   }
 
   void wait_for_time(Nanoseconds receive_ns) const {
@@ -248,6 +276,10 @@ class Player {
   bus::Subscription<trigpoint_msgs::msg::LioStatus> lio_status_;
   bus::Subscription<trigpoint_msgs::msg::GpsStatus> gps_status_;
   bus::Subscription<trigpoint_msgs::msg::FusionStatus> fusion_status_;
+  Answerer mapper_{"the mapper",
+                   [this] { return std::min(lio_status_.matched(), points_.matched()); }};
+  Answerer filter_{"the GPS filter",
+                   [this] { return std::min(gps_status_.matched(), fixes_.matched()); }};
 };
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include "../export/scratch_folder.hpp"
 #include "made_session.hpp"
+#include "restarts.hpp"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -19,6 +20,7 @@ namespace {
 
 using test::make_session;
 using ::testing::AllOf;
+using ::testing::Contains;
 using ::testing::Each;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -349,6 +351,45 @@ TEST(Report, says_that_the_user_interrupted_the_run_and_takes_that_for_no_failur
   EXPECT_THAT(result.text,
               AllOf(HasSubstr("**The run was interrupted by the user**"),
                     HasSubstr("NOT ALL ACCOUNTED FOR, because the run was interrupted")));
+}
+
+TEST(Report,
+     lists_restarts_and_the_scans_missed_meanwhile_and_takes_what_they_cost_for_no_failure) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  exporter::CountsWriter(folder.path(), "lio_mapper")
+      .write({{"points.received", 1200}, {"points.used", 1200}, {"imu.received", 24000}});
+  ASSERT_THAT(write_report(folder.path(), kNoPictures).failures, Not(IsEmpty()));
+  write_all(folder.file("restarts.csv"),
+            "unix_s,program,restarted,lived_s,what\n"
+            "1700000000,trigpoint_lio_mapper,1,23.1,\"was killed by signal 9 (Killed)\"\n"
+            "1700000050,trigpoint_fusion_gate,0,0.5,\"ended with code 1, again\"\n");
+  const auto result = write_report(folder.path(), kNoPictures);
+  EXPECT_THAT(result.failures, IsEmpty());
+  EXPECT_THAT(result.text,
+              AllOf(HasSubstr("## Restarts"),
+                    HasSubstr("was killed by signal 9 (Killed)"),
+                    HasSubstr("ended with code 1, again"),
+                    HasSubstr("given up"),
+                    HasSubstr("Scans missed: 0."),
+                    HasSubstr("NOT ALL ACCOUNTED FOR, because processes were down")));
+  write_all(folder.file("restarts.csv"), "unix_s,program,restarted,lived_s,what\nnonsense\n");
+  EXPECT_THAT(write_report(folder.path(), kNoPictures).problems,
+              Contains(HasSubstr("restarts.csv:2")));
+}
+
+TEST(Restarts, count_the_scans_missed_by_the_usual_interval) {
+  std::vector<exporter::LoggedScan> scans;
+  for (const int tenth : {0, 1, 2, 3, 8, 9, 10, 12, 13}) {
+    scans.emplace_back().status.stamp_ns = 1'000'000'000 + tenth * Nanoseconds{100'000'000};
+  }
+  const std::vector<MissedScans> missed = find_missed_scans(scans);
+  ASSERT_EQ(missed.size(), 2U);
+  EXPECT_EQ(missed[0].scans, 4U);
+  EXPECT_EQ(missed[0].after_ns, 1'300'000'000);
+  EXPECT_EQ(missed[0].before_ns, 1'800'000'000);
+  EXPECT_EQ(missed[1].scans, 1U);
+  EXPECT_TRUE(find_missed_scans({}).empty());
 }
 
 TEST(Report, fails_without_an_admitted_alignment_but_in_mode_lio) {

@@ -357,6 +357,34 @@ TEST(FusionGate, carries_on_with_gps_when_the_mapper_dies_and_flags_it) {
   EXPECT_EQ(drive.record().statuses.back().axes[1].source, AxisSource::kFused);
 }
 
+TEST(FusionGate, takes_over_from_a_gps_that_went_astray_when_the_mapper_comes_back_behind_it) {
+  Scenario scenario;
+  scenario.config = Config{};  // mode smooth
+  scenario.with_imu_rate = false;
+  SimulatedDrive drive{scenario};
+  drive.run_until(20.0);
+  drive.lio_alive = false;
+  drive.gps_alive = false;
+  for (int k = 0; k < 150; ++k) {
+    const double now_s = 20.0 + 0.02 * k;
+    Odometry odometry = drive.lio_odometry(now_s);
+    odometry.frame_id = "map";
+    odometry.T_frame_child = drive.T_map_base(now_s);
+    odometry.T_frame_child.p.x() += 5.0;
+    drive.keep(drive.gate().on_gps_odometry(odometry, "gps-a"));
+  }
+  for (int k = 0; k < 30; ++k) {  // the scans that waited, and newer ones
+    const double scan_s = 22.0 + 0.1 * k;
+    drive.keep(drive.gate().on_lio_odometry(drive.lio_odometry(scan_s)));
+    drive.keep(drive.gate().on_lio_status(drive.lio_status(scan_s)));
+  }
+  EXPECT_NEAR(to_seconds(drive.record().fused.back().stamp_ns - drive.stamp(0.0)), 24.9, 0.01);
+  for (const Odometry& fused : drive.record().fused) {
+    const Pose truth = drive.T_map_base(to_seconds(fused.stamp_ns - drive.stamp(0.0)));
+    EXPECT_LT((fused.T_frame_child.p - truth.p).norm(), 1.0);  // 2 s of the hand-over to GPS
+  }
+}
+
 TEST(FusionGate, carries_on_with_lio_when_gps_dies_and_flags_it) {
   SimulatedDrive drive{Scenario{}};
   drive.run_until(20.0);

@@ -72,6 +72,96 @@ TEST(GpsSources, change_over_to_a_healthier_one_only_after_the_hold_time) {
   EXPECT_EQ(sources.followed(), "b");
 }
 
+constexpr double kHandOver_s = 0.5;  // issue: when it dies, stalls or degrades
+
+/// Two filters at 50 Hz, statuses at 5 Hz; `a` is followed. At 20 s something happens to it.
+class TwoFilters : public ::testing::Test {
+ protected:
+  enum class Event { kDies, kRepeatsItself, kDegrades };
+
+  /// Seconds until `b` is followed; NaN when it never was.
+  double hand_over_s(Event event, double filter_hz = 50.0) {
+    GpsSources sources{Config{}};
+    const auto say = [&](const std::string& who, double stamp_s, GpsHealth health) {
+      Odometry odometry;
+      odometry.stamp_ns = from_seconds(stamp_s);
+      sources.on_odometry(odometry, who);
+      sources.on_status(status_at(stamp_s, health, stamp_s), who);
+    };
+    for (int k = 0; k < 1200; ++k) {
+      const double now_s = 10.0 + k / filter_hz;
+      const bool happened = now_s >= kHappens_s;
+      if (!happened || event == Event::kDegrades) {
+        say("a", now_s, happened ? GpsHealth::kDegraded : GpsHealth::kOk);
+      } else if (event == Event::kRepeatsItself) {
+        say("a", kHappens_s, GpsHealth::kOk);
+      }
+      sources.select(from_seconds(now_s));
+      if (sources.followed() == "b") {
+        return now_s - kHappens_s;
+      }
+      if (k > 0) {
+        say("b", now_s, GpsHealth::kOk);
+      }
+    }
+    return kNaN;
+  }
+
+  static constexpr double kHappens_s = 20.0;
+};
+
+TEST_F(TwoFilters, change_over_within_half_a_second_when_the_followed_one_dies) {
+  EXPECT_GE(hand_over_s(Event::kDies), 0.0);
+  EXPECT_LT(hand_over_s(Event::kDies), kHandOver_s);
+}
+
+TEST_F(TwoFilters, change_over_within_half_a_second_when_the_followed_one_stalls) {
+  EXPECT_GE(hand_over_s(Event::kRepeatsItself), 0.0);
+  EXPECT_LT(hand_over_s(Event::kRepeatsItself), kHandOver_s);
+}
+
+TEST_F(TwoFilters, change_over_within_half_a_second_when_the_followed_one_degrades) {
+  EXPECT_GE(hand_over_s(Event::kDegrades), 0.0);
+  EXPECT_LT(hand_over_s(Event::kDegrades), kHandOver_s);
+}
+
+TEST_F(TwoFilters, that_speak_once_a_second_are_not_taken_for_dead_between_two_words) {
+  EXPECT_GT(hand_over_s(Event::kDies, 1.0), 0.5);
+}
+
+TEST(GpsSources, do_not_take_a_first_stamp_of_zero_for_a_usual_gap) {
+  GpsSources sources{Config{}};
+  sources.on_status(status_at(0.0, GpsHealth::kInit), "a");
+  for (int k = 0; k < 500; ++k) {
+    const double now_s = 1.7e9 + 0.02 * k;
+    sources.on_status(status_at(now_s, GpsHealth::kOk, now_s), "a");
+    sources.on_status(status_at(now_s, GpsHealth::kDegraded, now_s), "b");
+    sources.select(from_seconds(now_s));
+  }
+  ASSERT_EQ(sources.followed(), "a");
+  const double later_s = 1.7e9 + 10.0 + kHandOver_s;
+  sources.on_status(status_at(later_s, GpsHealth::kDegraded, later_s), "b");
+  EXPECT_TRUE(sources.select(from_seconds(later_s)));
+}
+
+TEST(GpsSources, do_not_leave_a_silent_one_for_one_that_is_of_no_use) {
+  GpsSources sources{Config{}};
+  sources.on_status(status_at(10.0, GpsHealth::kOk), "a");
+  sources.select(from_seconds(10.0));
+  sources.on_status(status_at(10.6, GpsHealth::kStale), "b");
+  EXPECT_FALSE(sources.select(from_seconds(10.6)));
+  EXPECT_EQ(sources.followed(), "a");
+}
+
+TEST(GpsSources, forget_writers_that_died_long_ago) {
+  GpsSources sources{Config{}};
+  sources.on_status(status_at(10.0, GpsHealth::kOk), "dead");
+  sources.on_status(status_at(100.0, GpsHealth::kOk), "alive");
+  sources.select(from_seconds(100.0));
+  EXPECT_EQ(sources.find("dead"), nullptr);
+  EXPECT_NE(sources.find("alive"), nullptr);
+}
+
 TEST(GpsSources, follow_nobody_when_all_are_silent) {
   GpsSources sources{Config{}};
   sources.on_status(status_at(10.0, GpsHealth::kOk), "a");

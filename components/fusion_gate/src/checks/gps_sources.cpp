@@ -3,8 +3,21 @@
 #include "checks/gps_sources.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <tuple>
 
 namespace trigpoint::fusion_gate {
+
+namespace {
+
+/// Two filters are not heard in step: the other one's stamp, or LIO's, may be ahead by so much.
+constexpr double kLeastSilence_s = 0.25;
+constexpr double kSilentGaps = 2.5;  ///< of the usual ones
+constexpr double kGapMemory_s = 2.0;
+constexpr double kForgotten_s = 60.0;
+constexpr int kUsableRank = 2;
+
+}  // namespace
 
 std::optional<std::string> GpsSources::on_odometry(const Odometry& odometry,
                                                    const std::string& writer) {
@@ -27,18 +40,28 @@ GpsSource& GpsSources::heard(const std::string& writer, Nanoseconds stamp_ns) {
   const auto [entry, is_new] = sources_.try_emplace(writer);
   if (is_new) {
     entry->second.first_heard_ns = stamp_ns;
+    entry->second.last_heard_ns = stamp_ns;
   }
-  entry->second.last_heard_ns = std::max(entry->second.last_heard_ns, stamp_ns);
-  return entry->second;
+  GpsSource& source = entry->second;
+  const double gap_s = to_seconds(stamp_ns - source.last_heard_ns);
+  if (gap_s > 0.0) {
+    // The first stamp may be none (zero): a gap beyond the timeout says nothing of what is usual.
+    source.usual_gap_s = std::max(std::min(gap_s, config_.source_timeout_s),
+                                  source.usual_gap_s * std::exp(-gap_s / kGapMemory_s));
+    source.last_heard_ns = stamp_ns;
+  }
+  return source;
 }
 
 bool GpsSources::select(Nanoseconds now_ns) {
+  forget_dead(now_ns);
   const std::string before = followed_;
   const std::string best = best_alive(now_ns);
   const GpsSource* current = followed_source();
   if (best.empty()) {
     followed_.clear();
-  } else if (current == nullptr || is_stale(*current, now_ns)) {
+  } else if (current == nullptr || is_stale(*current, now_ns) ||
+             (best != followed_ && may_stand_in(sources_.at(best), *current, now_ns))) {
     followed_ = best;
   } else if (best != followed_ && is_better(sources_.at(best), *current)) {
     if (challenger_ != best) {
@@ -76,6 +99,28 @@ bool GpsSources::is_stale(const GpsSource& source, Nanoseconds now_ns) const {
   return to_seconds(now_ns - source.last_heard_ns) > config_.source_timeout_s;
 }
 
+/// Long before it counts as stale, which is for who has nobody to stand in for it.
+bool GpsSources::is_silent(const GpsSource& source, Nanoseconds now_ns) const {
+  const double limit_s = std::max(kLeastSilence_s, kSilentGaps * source.usual_gap_s);
+  return to_seconds(now_ns - source.last_heard_ns) > std::min(limit_s, config_.source_timeout_s);
+}
+
+/// At once, without being healthier: the followed one says nothing any more.
+bool GpsSources::may_stand_in(const GpsSource& candidate,
+                              const GpsSource& current,
+                              Nanoseconds now_ns) const {
+  return is_silent(current, now_ns) && !is_silent(candidate, now_ns) &&
+         rank_of(candidate) <= std::max(rank_of(current), kUsableRank);
+}
+
+/// Every restart of a filter is a new writer.
+void GpsSources::forget_dead(Nanoseconds now_ns) {
+  std::erase_if(sources_, [&](const auto& entry) {
+    return entry.first != followed_ &&
+           to_seconds(now_ns - entry.second.last_heard_ns) > kForgotten_s;
+  });
+}
+
 int GpsSources::rank_of(const GpsSource& source) const {
   if (!source.status) {
     return 2;
@@ -109,17 +154,14 @@ bool GpsSources::is_better(const GpsSource& candidate, const GpsSource& current)
 }
 
 std::string GpsSources::best_alive(Nanoseconds now_ns) const {
+  const auto order = [&](const GpsSource& source) {
+    const Nanoseconds newest_ns = source.status ? source.status->last_accepted_fix_ns : 0;
+    return std::make_tuple(is_silent(source, now_ns), rank_of(source), -newest_ns);
+  };
   std::string best;
   for (const auto& [writer, source] : sources_) {
-    if (is_stale(source, now_ns)) {
-      continue;
-    }
     const GpsSource* leader = find(best);
-    const auto newest = [](const GpsSource& s) {
-      return s.status ? s.status->last_accepted_fix_ns : 0;
-    };
-    if (leader == nullptr || rank_of(source) < rank_of(*leader) ||
-        (rank_of(source) == rank_of(*leader) && newest(source) > newest(*leader))) {
+    if (!is_stale(source, now_ns) && (leader == nullptr || order(source) < order(*leader))) {
       best = writer;
     }
   }

@@ -15,13 +15,15 @@ namespace trigpoint::fusion_gate {
 struct GpsSource {
   Nanoseconds first_heard_ns{0};
   Nanoseconds last_heard_ns{0};
+  double usual_gap_s{0.0};  ///< longest between two of its stamps, forgotten within seconds
   std::optional<Odometry> odometry;  ///< newest
   std::optional<GpsStatus> status;   ///< newest
 };
 
 /// The GPS writers on the bus, and which of them is followed: the healthiest, then the one with the
-/// newest accepted fix. The followed one is kept until it goes stale, another one has been
-/// healthier for source_hold_s, or is ahead by source_timeout_s of accepted fixes.
+/// newest accepted fix. The followed one is kept until it goes stale, falls silent for longer than
+/// it usually does while another one speaks, another one has been healthier for source_hold_s, or
+/// is ahead by source_timeout_s of accepted fixes.
 class GpsSources {
  public:
   explicit GpsSources(const Config& config) : config_(config) {}
@@ -42,6 +44,9 @@ class GpsSources {
  private:
   GpsSource& heard(const std::string& writer, Nanoseconds stamp_ns);
   bool is_stale(const GpsSource& source, Nanoseconds now_ns) const;
+  bool is_silent(const GpsSource& source, Nanoseconds now_ns) const;
+  bool may_stand_in(const GpsSource& candidate, const GpsSource& current, Nanoseconds now_ns) const;
+  void forget_dead(Nanoseconds now_ns);
   /// Lower is better: 0 ok, 1 degraded, 2 foreign (says nothing of itself), 3 init, 4 dead
   /// reckoning, 5 stale, 6 fault.
   int rank_of(const GpsSource& source) const;

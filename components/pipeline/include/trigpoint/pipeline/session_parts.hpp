@@ -26,7 +26,8 @@ class GpsPart {
   void on_odometry(const Odometry& odometry);
   void on_status(const GpsStatus& status);
   void on_datum(const Datum& datum);
-  void close(const GpsStatus& status);
+  /// Cheap enough for once a second, so that a program that is killed leaves what it counted.
+  void keep_counts(const GpsStatus& status);
 
  private:
   std::string session_;
@@ -34,6 +35,9 @@ class GpsPart {
   exporter::GpsStatusLog statuses_;
   exporter::CountsWriter counts_;
 };
+
+/// The datum that is stored in a session folder, if any.
+std::optional<Datum> stored_datum(const std::string& session);
 
 /// The checkpoint that a mapper left in a session folder, if any.
 std::optional<lio_mapper::Checkpoint> stored_checkpoint(const std::string& session);
@@ -85,6 +89,8 @@ class GatePart {
   /// seconds of data time (the newest status's) unless the gate's verdict on it changed; cheap
   /// enough for every status.
   void on_alignment(const Alignment& alignment, bool admitted);
+  /// Cheap enough for once a second, so that a program that is killed leaves what it counted.
+  void keep_counts();
   void close();
 
  private:

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "only_one.hpp"
+
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+
+namespace trigpoint::shell {
+
+namespace {
+
+constexpr const char* kAge = "running_s";
+constexpr const char* kProcess = "process";
+/// Ages that differ by less say nothing about who was first.
+constexpr double kSameAge_s = 0.5;
+constexpr std::size_t kParticipantDigits = 24;  ///< of a writer's GUID in hexadecimal digits
+
+std::string participant_of(const std::string& writer_guid) {
+  return writer_guid.substr(0, kParticipantDigits);
+}
+
+}  // namespace
+
+OnlyOne::OnlyOne(bus::Participant& participant,
+                 bus::Loop& loop,
+                 const std::string& role,
+                 const EventLog& log)
+    : loop_(loop),
+      role_(role),
+      name_(role + ": only one"),
+      log_(log),
+      claims_(participant,
+              bus::topics::diagnostics,
+              {[this](int) { loop_.post([this] { claim(); }, bus::WhenFull::kDropOldest); }, {}}),
+      others_(participant,
+              bus::topics::diagnostics,
+              [this](const diagnostic_msgs::msg::DiagnosticArray& m, const bus::MessageInfo& info) {
+                if (auto other = claim_in(m, name_, info.writer_guid)) {
+                  loop_.post([this, other = std::move(*other)] { hear(other); });
+                }
+              }) {
+  own_participant_ = participant_of(claims_.guid());
+  loop.every(std::chrono::seconds(1), [this] { claim(); });
+}
+
+double OnlyOne::age_s() const {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
+}
+
+void OnlyOne::claim() {
+  const bus::Diagnostic line{
+      bus::DiagnosticLevel::kOk,
+      name_,
+      "there may be one on a domain: who was first stays",
+      "",
+      {{kAge, std::to_string(age_s())}, {kProcess, std::to_string(getpid())}}};
+  claims_.publish(bus::to_message(0, {&line, 1}));
+}
+
+std::optional<OnlyOne::Claim> OnlyOne::claim_in(
+    const diagnostic_msgs::msg::DiagnosticArray& message,
+    const std::string& name,
+    const std::string& writer) {
+  for (const bus::Diagnostic& line : bus::from_message(message)) {
+    if (line.name != name) {
+      continue;
+    }
+    Claim claim{participant_of(writer), "?", 0.0};
+    for (const auto& [key, value] : line.values) {
+      if (key == kAge) {
+        claim.age_s = std::strtod(value.c_str(), nullptr);
+      } else if (key == kProcess) {
+        claim.process = value;
+      }
+    }
+    return claim;
+  }
+  return std::nullopt;
+}
+
+void OnlyOne::hear(const Claim& other) {
+  if (other.participant == own_participant_ || is_too_many_) {
+    return;
+  }
+  const double older_s = other.age_s - age_s();
+  const bool other_was_first =
+      std::abs(older_s) > kSameAge_s ? older_s > 0.0 : other.participant < own_participant_;
+  const std::string who = "another " + role_ + " (process " + other.process + ", DDS participant " +
+                          other.participant + ")";
+  if (other_was_first) {
+    is_too_many_ = true;
+    log_.error(who +
+               " was first on this DDS domain and what both publish would be mixed: ending. " +
+               "End the other one, or take another domain (ROS_DOMAIN_ID=N)");
+    loop_.stop();
+  } else if (known_.insert(other.participant).second) {
+    log_.warning(who +
+                 " has come to this DDS domain, where there may be one: it should end itself");
+    claim();
+  }
+}
+
+}  // namespace trigpoint::shell
