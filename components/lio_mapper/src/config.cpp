@@ -98,11 +98,12 @@ void describe_matching(MatchingConfig& c, ConfigFields& f) {
            "a plane that the beam hits at an angle with this cosine has half its weight, flatter "
            "ones less: points of one ring lie on such a plane also where there is no surface",
            kNotNegative);
-  f.number("independent_residuals",
-           c.independent_residuals,
-           "the residuals of a scan together weigh as at most this many independent ones, because "
-           "neighbours share the map's errors",
-           kPositive);
+  f.number(
+      "patch_m",
+      c.patch_m,
+      "the residuals of a scan in a cube of this side together weigh as one, because they share "
+      "the map's errors",
+      {0.01, 1000.0});
   f.integer(
       "min_matches", c.min_matches, "fewer matched points and the scan is not used", {6, 1e6});
   f.integer("max_iterations", c.max_iterations, "of the iterated update", {1, 50});

@@ -28,7 +28,7 @@ constexpr double kNarrowing = 0.7;
 constexpr double kConverged2 = 0.01;
 constexpr double kNear_m = 0.1;
 constexpr double kPointSigma_m = 0.03;
-/// Neighbouring points share the map's errors (as matching.independent_residuals).
+/// Neighbouring points share the map's errors (as within matching.patch_m).
 constexpr double kIndependent = 100.0;
 constexpr double kStartSigma_m = 1.0;
 constexpr double kStartSigma_rad = 0.05;

@@ -141,4 +141,26 @@ Pose Path::at(Nanoseconds stamp_ns) const {
               0.5 * dt_s * dt_s * node.acceleration_odom_mps2};
 }
 
+Path Path::ending_at(const Pose& T_odom_base) const {
+  const PathNode& end = nodes_.back();
+  const Vector3d turn_odom = so3_log(T_odom_base.q * end.T_odom_base.q.conjugate());
+  const Vector3d shift_m = T_odom_base.p - end.T_odom_base.p;
+  Path path = *this;
+  for (PathNode& node : path.nodes_) {
+    const double share =
+        end.turn_variance_rad2 > 0.0 ? node.turn_variance_rad2 / end.turn_variance_rad2 : 1.0;
+    node.T_odom_base.q = (so3_exp(share * turn_odom) * node.T_odom_base.q).normalized();
+    node.T_odom_base.p += share * shift_m;
+  }
+  for (std::size_t i = 0; i + 1 < path.nodes_.size(); ++i) {
+    PathNode& node = path.nodes_[i];
+    const PathNode& next = path.nodes_[i + 1];
+    const double dt_s = to_seconds(next.stamp_ns - node.stamp_ns);
+    node.angular_radps = so3_log(node.T_odom_base.q.conjugate() * next.T_odom_base.q) / dt_s;
+    node.v_odom_mps =
+        (next.T_odom_base.p - node.T_odom_base.p) / dt_s - 0.5 * dt_s * node.acceleration_odom_mps2;
+  }
+  return path;
+}
+
 }  // namespace trigpoint::lio_mapper

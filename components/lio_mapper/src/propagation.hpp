@@ -81,6 +81,7 @@ struct PathNode {
   Eigen::Vector3d v_odom_mps{Eigen::Vector3d::Zero()};
   Eigen::Vector3d acceleration_odom_mps2{Eigen::Vector3d::Zero()};  ///< until the next node
   Eigen::Vector3d angular_radps{Eigen::Vector3d::Zero()};           ///< base axes, until the next
+  double turn_variance_rad2{0.0};  ///< what the gyro's noise has added since the path began
 };
 
 /// Poses at IMU stamps between two scans, as propagated, oldest first.
@@ -102,6 +103,11 @@ class Path {
 
   /// Before the first node and after the last one the motion of the nearest node goes on.
   Pose at(Nanoseconds stamp_ns) const;
+
+  /// The path given that it ends at `T_odom_base`: each node moves by the share that its turn's
+  /// variance has of the end's, which is its covariance with the end's error over the variance of
+  /// that, as for any process with independent increments.
+  Path ending_at(const Pose& T_odom_base) const;
 
  private:
   std::vector<PathNode> nodes_;

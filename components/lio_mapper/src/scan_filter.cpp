@@ -37,6 +37,11 @@ constexpr double kMostInherited_rad = 0.01;
 constexpr double kSmooth_m = 0.01;
 /// ... and what a thicker one displaces at this distance turns the pose.
 constexpr double kLever_m = 10.0;
+/// A sweep of a guessed motion that was wrong by more at its end is undistorted anew: a smear of
+/// range noise, at 10 m.
+constexpr double kSmear_m = 0.02;
+constexpr double kSmear_rad = 2e-3;
+constexpr int kMostReshapes = 2;
 /// A scan is put into the map unmatched only while its pose relative to the map is this certain.
 constexpr double kMapSigma_m = 0.3;
 
@@ -197,8 +202,10 @@ ScanFilter::Prediction ScanFilter::predict(const Sweep& sweep, const ImuBuffer& 
     node.angular_radps =
         0.5 * (step.begin.gyro_radps + step.end.gyro_radps) - prediction.state.gyro_bias_radps;
     prediction.path.push_back(node);
-    propagate_covariance(
-        jacobian, config_.imu, noise_of(config_.imu, step, gap_s), prediction.covariance);
+    const StepNoise noise = noise_of(config_.imu, step, gap_s);
+    propagate_covariance(jacobian, config_.imu, noise, prediction.covariance);
+    prediction.guessed |= step.noise_factor() > 1.0;
+    node.turn_variance_rad2 += noise.gyro2 * dt_s;
     apply_transition(jacobian, prediction.transition);
     prediction.state = next;
     node.stamp_ns = step.end.stamp_ns;
@@ -268,6 +275,35 @@ UpdateResult ScanFilter::match(const Prediction& prediction,
   return result;
 }
 
+void ScanFilter::shape(const Sweep& sweep,
+                       const Prediction& prediction,
+                       ScanOutcome& outcome) const {
+  begin(Stage::kUndistort);
+  outcome.points_base = undistort(sweep, prediction.path, prediction.state.T_base_lidar);
+  begin(Stage::kDownsample);
+  outcome.thinned_base = downsample(outcome.points_base, config_.matching.voxel_m);
+  outcome.points = outcome.thinned_base.size();
+}
+
+/// Where the motion within the sweep was a guess, the match tells better how the sweep is to be
+/// undistorted; then it is matched anew.
+UpdateResult ScanFilter::match_guessed(const Sweep& sweep,
+                                       Prediction& prediction,
+                                       ScanOutcome& outcome) {
+  UpdateResult result = match(prediction, outcome.thinned_base, outcome);
+  for (int i = 0; i < kMostReshapes && result.used; ++i) {
+    const Pose T_end_found =
+        prediction.path.back().T_odom_base.inverse() * result.state.T_odom_base;
+    if (T_end_found.p.norm() < kSmear_m && so3_log(T_end_found.q).norm() < kSmear_rad) {
+      break;
+    }
+    prediction.path = prediction.path.ending_at(result.state.T_odom_base);
+    shape(sweep, prediction, outcome);
+    result = match(prediction, outcome.thinned_base, outcome);
+  }
+  return result;
+}
+
 void ScanFilter::begin(Stage stage) const {
   if (observe_) {
     observe_(stage);
@@ -333,11 +369,7 @@ ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu, const 
   add_drift(prediction);
 
   ScanOutcome outcome;
-  begin(Stage::kUndistort);
-  outcome.points_base = undistort(sweep, prediction.path, prediction.state.T_base_lidar);
-  begin(Stage::kDownsample);
-  outcome.thinned_base = downsample(outcome.points_base, config_.matching.voxel_m);
-  outcome.points = outcome.thinned_base.size();
+  shape(sweep, prediction, outcome);
   outcome.first = map_->empty();
 
   begin(Stage::kSolve);
@@ -350,7 +382,9 @@ ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu, const 
   if (outcome.first) {
     outcome.used = outcome.points >= static_cast<std::size_t>(config_.matching.min_matches);
   } else if (match_it) {
-    const UpdateResult result = match(prediction, outcome.thinned_base, outcome);
+    const UpdateResult result = prediction.guessed
+                                    ? match_guessed(sweep, prediction, outcome)
+                                    : match(prediction, outcome.thinned_base, outcome);
     compare_clocks(result, sweep.end_ns, imu);
     record.before_rows = result.state;
     record.covariance_before_rows = result.covariance;

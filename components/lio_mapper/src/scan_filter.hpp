@@ -127,6 +127,7 @@ class ScanFilter {
     ErrorMatrix covariance;
     ErrorMatrix transition{ErrorMatrix::Identity()};
     Path path{};
+    bool guessed{false};  ///< in part: the IMU was saturated
   };
 
   Prediction predict(const Sweep& sweep, const ImuBuffer& imu) const;
@@ -134,6 +135,8 @@ class ScanFilter {
   void begin(Stage stage) const;
   /// The prediction conditioned on the pose that a search found; false when it found none.
   bool search(const PoseSearch& look, const PointCloud& thinned_base, Prediction& prediction) const;
+  void shape(const Sweep& sweep, const Prediction& prediction, ScanOutcome& outcome) const;
+  UpdateResult match_guessed(const Sweep& sweep, Prediction& prediction, ScanOutcome& outcome);
   UpdateResult match(const Prediction& prediction,
                      const PointCloud& thinned_base,
                      ScanOutcome& outcome);

@@ -2,8 +2,10 @@
 // Copyright the Trigpoint developers
 #include "scan_matcher.hpp"
 
+#include "voxel_key.hpp"
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <tsl/robin_map.h>
 
 #include <algorithm>
 #include <cmath>
@@ -59,7 +61,7 @@ void add_row(const typename Information<Size>::Vector& h,
 /// noise and f = 1 - N / A: the solution g / (A - N) has the variance A / (A - N)^2, which is that
 /// of the information f^2 A with the gradient f g.
 template <int Size>
-void take_out_noise(Information<Size>& sum) {
+typename Information<Size>::Matrix noise_free_share(const Information<Size>& sum) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(
       sum.information.template topLeftCorner<3, 3>());
   Eigen::Matrix3d keep = Eigen::Matrix3d::Zero();
@@ -71,8 +73,31 @@ void take_out_noise(Information<Size>& sum) {
   }
   typename Information<Size>::Matrix by = Information<Size>::Matrix::Identity();
   by.template topLeftCorner<3, 3>() = keep;
-  sum.information = (by * sum.information * by).eval();
-  sum.gradient = (by * sum.gradient).eval();
+  return by;
+}
+
+/// Where the residuals at the optimum scatter more than their variances say, as those of crowns do,
+/// their estimate is as much less certain: with A = L L^T and B = sum w^2 r^2 h h^T its covariance
+/// is A^-1 B A^-1 [H. White, "A heteroskedasticity-consistent covariance matrix estimator", 1980],
+/// and the eigenvalues of L^-1 B L^-T are how many times the stated variance that is, direction by
+/// direction. Each such direction keeps its estimate and loses that share of its information;
+/// where they scatter less, nothing is gained: what a scan shares with the map scatters in neither.
+template <int Size>
+void allow_for_scatter(const typename Information<Size>::Matrix& scatter,
+                       const Eigen::LLT<typename Information<Size>::Matrix>& root,
+                       const typename Information<Size>::Vector& step,
+                       Information<Size>& sum) {
+  using Matrix = typename Information<Size>::Matrix;
+  const Matrix half = root.matrixL().solve(scatter);
+  const Matrix times_stated = root.matrixL().solve(half.transpose());
+  const Eigen::SelfAdjointEigenSolver<Matrix> eigen(times_stated);
+  if (!(eigen.eigenvalues()[Size - 1] > 1.0)) {
+    return;
+  }
+  const Matrix directions = root.matrixL() * eigen.eigenvectors();
+  sum.information = directions * eigen.eigenvalues().cwiseMax(1.0).cwiseInverse().asDiagonal() *
+                    directions.transpose();
+  sum.gradient = -(sum.information * step).eval();
 }
 
 std::size_t blocks_of(std::size_t count) {
@@ -100,6 +125,35 @@ ScanMatcher::ScanMatcher(const PointCloud& points_base,
     r.range_m = beam_m.norm();
     r.direction_base = beam_m / std::max(r.range_m, kLeastRange_m);
   }
+  number_patches();
+}
+
+/// Points out of the index's range, which no LiDAR reaches, are one patch.
+void ScanMatcher::number_patches() {
+  const double per_m = 1.0 / config_.patch_m;
+  tsl::robin_map<VoxelKey, std::uint32_t, VoxelKeyHash> numbers;
+  for (Residual& r : residuals_) {
+    const Vector3d& p = r.point_base_m;
+    const VoxelKey key = voxel_index_fits(p.x(), p.y(), p.z(), per_m)
+                             ? voxel_key(voxel_index(p.x(), p.y(), p.z(), per_m))
+                             : ~VoxelKey{0};
+    r.patch = numbers.try_emplace(key, static_cast<std::uint32_t>(numbers.size())).first->second;
+  }
+  patches_.resize(numbers.size());
+}
+
+/// With a residual in them.
+std::size_t ScanMatcher::count_patches() {
+  std::fill(patches_.begin(), patches_.end(), std::uint8_t{0});
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < residuals_.size(); ++i) {
+    std::uint8_t& seen = patches_[residuals_[i].patch];
+    if (found_[i] == Found::kPlane && seen == 0) {
+      seen = 1;
+      ++count;
+    }
+  }
+  return count;
 }
 
 ScanMatcher::Found ScanMatcher::look_up(Ask ask, Residual& r) const {
@@ -163,18 +217,22 @@ double ScanMatcher::weight_of(const Residual& r, double cos_incidence) const {
   return surface * (ratio > 1.0 ? 1.0 / ratio : 1.0) / variance;
 }
 
-void ScanMatcher::add(Residual& r, const Viewpoint& view, PoseInformation& sum) const {
+template <>
+Vector6d ScanMatcher::row_of<error::kPose>(Residual& r, const Viewpoint& view) const {
   const Vector3d normal_base = view.R_odom_base.transpose() * r.plane.normal;
   r.residual_m =
       normal_base.dot(r.point_base_m) + r.plane.normal.dot(view.T_odom_base.p) + r.plane.offset_m;
-  const double weight = weight_of(r, normal_base.dot(r.direction_base));
+  r.weight = weight_of(r, normal_base.dot(r.direction_base));
   // d(n . R exp(e) p) / de = (p x R^T n)^T
   Vector6d h;
   h << r.plane.normal, r.point_base_m.cross(normal_base);
-  add_row(h, weight, r.residual_m, r.plane, sum);
+  return h;
 }
 
-void ScanMatcher::add(Residual& r, const Viewpoint& view, PoseAndExtrinsicInformation& sum) const {
+template <>
+PoseAndExtrinsicInformation::Vector ScanMatcher::row_of<error::kPoseAndExtrinsic>(
+    Residual& r,
+    const Viewpoint& view) const {
   const Vector3d point_base_m = view.T_base_base * r.point_base_m;
   const Vector3d point_odom_m = view.R_odom_base * point_base_m + view.T_odom_base.p;
   Vector3d normal = r.plane.normal;
@@ -201,26 +259,58 @@ void ScanMatcher::add(Residual& r, const Viewpoint& view, PoseAndExtrinsicInform
   }
   const Vector3d normal_base = view.R_odom_base.transpose() * normal;
   r.residual_m = normal.dot(point_odom_m - foot_odom_m);
-  const double weight = weight_of(r, normal_base.dot(r.direction_base));
+  r.weight = weight_of(r, normal_base.dot(r.direction_base));
   h.segment<3>(error::kPosition) = normal;
   h.segment<3>(error::kRotation) = point_base_m.cross(normal_base);
-  add_row(h, weight, r.residual_m, r.plane, sum);
+  return h;
 }
 
-/// Block by block and the blocks in order, so that the sum has the same rounding on any number of
-/// threads.
+/// Block by block, so that sums of blocks that are added in order have the same rounding on any
+/// number of threads.
+template <typename Visit>
+void ScanMatcher::in_blocks(const Visit& visit) {
+  workers_.run(blocks_of(residuals_.size()), [&](std::size_t block) {
+    const std::size_t end = std::min((block + 1) * kBlock, residuals_.size());
+    for (std::size_t i = block * kBlock; i < end; ++i) {
+      visit(block, i);
+    }
+  });
+}
+
+/// sum w^2 r^2 h h^T with the residuals r after `step`, whose rows and weights are those of `view`.
+template <int Size>
+typename Information<Size>::Matrix ScanMatcher::scatter_at(
+    const typename Information<Size>::Vector& step,
+    const Viewpoint& view,
+    std::vector<Information<Size>>& sums) {
+  using Matrix = typename Information<Size>::Matrix;
+  sums.assign(blocks_of(residuals_.size()), {});
+  in_blocks([&](std::size_t block, std::size_t i) {
+    if (found_[i] == Found::kPlane) {
+      Residual& r = residuals_[i];
+      const typename Information<Size>::Vector h = row_of<Size>(r, view);
+      const double part = r.weight * (r.residual_m + h.dot(step));
+      sums[block].information.noalias() += (part * part * h) * h.transpose();
+    }
+  });
+  Matrix sum = Matrix::Zero();
+  for (const Information<Size>& part : sums) {
+    sum += part.information;
+  }
+  return sum;
+}
+
 template <int Size>
 Information<Size> ScanMatcher::sum_of_all(const Viewpoint& view,
                                           const MapOrigins* origins,
                                           std::vector<Information<Size>>& sums) {
   sums.assign(blocks_of(residuals_.size()), {});
-  workers_.run(sums.size(), [&](std::size_t block) {
-    const std::size_t end = std::min((block + 1) * kBlock, residuals_.size());
-    for (std::size_t i = block * kBlock; i < end; ++i) {
-      refresh(i, view, origins);
-      if (found_[i] == Found::kPlane) {
-        add(residuals_[i], view, sums[block]);
-      }
+  in_blocks([&](std::size_t block, std::size_t i) {
+    refresh(i, view, origins);
+    if (found_[i] == Found::kPlane) {
+      Residual& r = residuals_[i];
+      const typename Information<Size>::Vector h = row_of<Size>(r, view);
+      add_row(h, r.weight, r.residual_m, r.plane, sums[block]);
     }
   });
   Information<Size> sum;
@@ -232,13 +322,18 @@ Information<Size> ScanMatcher::sum_of_all(const Viewpoint& view,
     sum.weighted_thickness2 += part.weighted_thickness2;
     sum.count += part.count;
   }
-  const double scale = std::min(
-      1.0,
-      config_.independent_residuals / static_cast<double>(std::max<std::size_t>(sum.count, 1)));
-  sum.information *= scale;
-  sum.gradient *= scale;
+  if (sum.count == 0) {
+    return sum;
+  }
+  using Matrix = typename Information<Size>::Matrix;
+  const Matrix by = noise_free_share(sum);
+  const Eigen::LLT<Matrix> root(sum.information + kLeastInformation * Matrix::Identity());
+  const typename Information<Size>::Vector step = -root.solve(sum.gradient);
+  allow_for_scatter(scatter_at(step, view, sums), root, step, sum);
+  const double scale = static_cast<double>(count_patches()) / static_cast<double>(sum.count);
+  sum.information = (scale * by * sum.information * by).eval();
+  sum.gradient = (scale * by * sum.gradient).eval();
   sum.noise *= scale;
-  take_out_noise(sum);
   return sum;
 }
 

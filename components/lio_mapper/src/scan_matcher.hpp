@@ -52,7 +52,9 @@ class ScanMatcher {
     Eigen::Vector3d looked_up_at_odom_m;
     PlaneMatch plane;
     double residual_m;
+    double weight;
     const MapOrigin* origin;  ///< of the plane; null: unknown, or not asked for
+    std::uint32_t patch;      ///< which cube of matching.patch_m it lies in
   };
 
   /// What is put in front of the residuals of one linearisation.
@@ -72,8 +74,17 @@ class ScanMatcher {
   static bool leaves_pose_open(const Matrix6d& information);
   double variance_m2(const Residual& residual, double cos_incidence) const;
   double weight_of(const Residual& residual, double cos_incidence) const;
-  void add(Residual& residual, const Viewpoint& view, PoseInformation& sum) const;
-  void add(Residual& residual, const Viewpoint& view, PoseAndExtrinsicInformation& sum) const;
+  /// Puts residual and weight of `view` into `residual` and gives its row of the Jacobian.
+  template <int Size>
+  typename Information<Size>::Vector row_of(Residual& residual, const Viewpoint& view) const;
+  template <int Size>
+  typename Information<Size>::Matrix scatter_at(const typename Information<Size>::Vector& step,
+                                                const Viewpoint& view,
+                                                std::vector<Information<Size>>& sums);
+  void number_patches();
+  std::size_t count_patches();
+  template <typename Visit>
+  void in_blocks(const Visit& visit);
   template <int Size>
   Information<Size> sum_of_all(const Viewpoint& view,
                                const MapOrigins* origins,
@@ -92,6 +103,7 @@ class ScanMatcher {
   bool also_nearest_{false};
   std::vector<Residual> residuals_;  ///< one a point, also where none was found
   std::vector<Found> found_;
+  std::vector<std::uint8_t> patches_;  ///< whether a residual lies in it
   // Of blocks.
   std::vector<PoseInformation> sums_;
   std::vector<PoseAndExtrinsicInformation> sums_with_extrinsic_;

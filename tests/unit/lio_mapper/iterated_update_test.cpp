@@ -223,7 +223,7 @@ TEST(ScanMatcher, gradient_and_information_are_the_derivatives_of_the_cost) {
   }
   const RoomMap map;
   MatchingConfig config;
-  config.independent_residuals = 1e9;
+  config.patch_m = 0.01;
   config.robust_width = 1e9;
   config.range_sigma_m = 0.02;
   config.angle_sigma_rad = 0.0;
@@ -276,7 +276,7 @@ TEST(ScanMatcher, gradient_with_extrinsic_is_the_derivative_of_the_cost) {
   }
   const RoomMap map;
   MatchingConfig config;
-  config.independent_residuals = 1e9;
+  config.patch_m = 0.01;
   config.grazing_cos = 0.0;
   config.robust_width = 1e9;
   config.range_sigma_m = 0.0;
@@ -343,15 +343,18 @@ TEST(ScanMatcher, does_not_see_the_extrinsic_from_where_the_map_was_made) {
   EXPECT_GT(share({so3_exp({0.0, 0.0, 0.02}), {}}), 1e-5);
 }
 
-TEST(ScanMatcher, many_residuals_weigh_as_much_as_the_independent_ones_only) {
-  PointCloud points(900, PointXyzi{10.0F, 1.0F, 0.0F, 0.0F});
+TEST(ScanMatcher, residuals_of_one_patch_weigh_as_one) {
+  const MatchingConfig config;
   const RoomMap map;
-  MatchingConfig config;
-  config.independent_residuals = 300.0;
-  ScanMatcher all(points, map, Pose{}, config, workers);
-  points.resize(300);
-  ScanMatcher few(points, map, Pose{}, config, workers);
-  EXPECT_NEAR(all.linearise({}).information(0, 0) / few.linearise({}).information(0, 0), 1.0, 1e-9);
+  const auto information_of = [&](std::size_t here, std::size_t elsewhere) {
+    PointCloud points(here, PointXyzi{10.0F, 1.0F, 0.0F, 0.0F});
+    const auto side = static_cast<float>(config.patch_m);
+    points.resize(here + elsewhere, PointXyzi{10.0F, 1.0F - side, 0.0F, 0.0F});
+    ScanMatcher matcher(points, map, Pose{}, config, workers);
+    return matcher.linearise({}).information(0, 0);
+  };
+  EXPECT_NEAR(information_of(900, 0) / information_of(1, 0), 1.0, 1e-9);
+  EXPECT_NEAR(information_of(900, 900) / information_of(900, 0), 2.0, 0.05);
 }
 
 TEST(ScanMatcher, sums_to_the_same_bits_on_any_number_of_threads) {

@@ -120,6 +120,47 @@ TEST(Path, goes_on_between_and_beyond_its_nodes_as_the_motion_says) {
   EXPECT_NEAR(path.at(-50'000'000).p.x(), -0.05 + 0.5 * 2.0 * 0.05 * 0.05, 1e-12);
 }
 
+/// A tenth of a second at 5 m/s in a turn of 0.8 rad/s, of which the gyro told 0.3 in its second
+/// half.
+TEST(Path, that_ends_elsewhere_bends_where_the_turn_was_uncertain) {
+  constexpr double kSpeed_mps = 5.0;
+  constexpr double kRate_radps = 0.8;
+  constexpr double kTold_radps = 0.3;
+  constexpr int kSteps = 20;
+  constexpr double kStep_s = 0.005;
+  const auto on_circle = [&](double angle) {
+    const double radius_m = kSpeed_mps / kRate_radps;
+    return Pose(from_yaw(angle),
+                {radius_m * std::sin(angle), radius_m * (1.0 - std::cos(angle)), 0.0});
+  };
+  Path path;
+  PathNode node;
+  node.T_odom_base = on_circle(0.0);
+  for (int i = 0; i <= kSteps; ++i) {
+    const bool saturated = i >= kSteps / 2;
+    const double rate_radps = saturated ? kTold_radps : kRate_radps;
+    const double yaw = so3_log(node.T_odom_base.q).z();
+    node.angular_radps = {0.0, 0.0, rate_radps};
+    node.v_odom_mps = {kSpeed_mps * std::cos(yaw), kSpeed_mps * std::sin(yaw), 0.0};
+    path.push_back(node);
+    node.stamp_ns += from_seconds(kStep_s);
+    node.turn_variance_rad2 += saturated ? 1.0 : 1e-4;
+    node.T_odom_base.q = node.T_odom_base.q * from_yaw(rate_radps * kStep_s);
+    node.T_odom_base.p += kStep_s * node.v_odom_mps;
+  }
+  const Path bent = path.ending_at(on_circle(kRate_radps * kSteps * kStep_s));
+  for (double t_s = 0.0; t_s < kSteps * kStep_s; t_s += 0.001) {
+    const Pose truth = on_circle(kRate_radps * t_s);
+    const Pose pose = bent.at(from_seconds(t_s));
+    EXPECT_LT(so3_log(truth.q.conjugate() * pose.q).norm(), 1e-4) << t_s;
+    EXPECT_LT((truth.p - pose.p).norm(), 0.005) << t_s;
+  }
+  EXPECT_GT(
+      so3_log(on_circle(kRate_radps * kSteps * kStep_s).q.conjugate() * path.back().T_odom_base.q)
+          .norm(),
+      0.02);
+}
+
 }  // namespace
 
 }  // namespace trigpoint::lio_mapper

@@ -141,5 +141,59 @@ TEST(ScanMatcher, a_residual_that_is_not_looked_up_again_is_of_the_present_pose)
   EXPECT_NEAR(step.tail<5>().norm(), 0.0, 1e-6);
 }
 
+/// The room's walls of x, whose points lie off them by `rough_m`, one to either side in turn.
+PoseInformation information_of_rough_ends(float rough_m, const Pose& T) {
+  Matching m(true);
+  int i = 0;
+  for (PointXyzi& p : m.points) {
+    const bool end = std::abs(p.x) > 3.9F;
+    p.x += end ? (++i % 2 == 0 ? rough_m : -rough_m) : 0.0F;
+  }
+  m.config.robust_width = 1e9;
+  ScanMatcher matcher(m.points, m.room, Pose{}, m.config, m.workers);
+  return matcher.linearise(T);
+}
+
+/// Their estimate's variance is that of the mean of such points, whatever the sensor's.
+TEST(ScanMatcher, residuals_that_scatter_more_than_they_say_leave_the_pose_as_much_less_certain) {
+  constexpr float kRough_m = 0.12F;
+  const Pose T;
+  const double smooth = information_of_rough_ends(0.0F, T).information(0, 0);
+  const double rough = information_of_rough_ends(kRough_m, T).information(0, 0);
+  // Var(sum w r / sum w) over its stated value 1 / sum w.
+  const MatchingConfig config;
+  double weights = 0.0;
+  double weights2 = 0.0;
+  for (const PointXyzi& point : room_points()) {
+    if (std::abs(point.x) > 3.9F) {
+      const Eigen::Vector3d p = point.position().cast<double>();
+      const double cos2 = p.x() * p.x() / p.squaredNorm();
+      const double sideways_m = config.angle_sigma_rad * p.norm();
+      const double variance_m2 =
+          2e-4 + std::pow(config.range_sigma_m, 2) * cos2 + sideways_m * sideways_m * (1.0 - cos2);
+      const double weight = cos2 / (cos2 + std::pow(config.grazing_cos, 2)) / variance_m2;
+      weights += weight;
+      weights2 += weight * weight;
+    }
+  }
+  const double times_stated = kRough_m * kRough_m * weights2 / weights;
+  ASSERT_GT(times_stated, 10.0);
+  EXPECT_NEAR(smooth / rough, times_stated, 0.05 * times_stated);
+  // The other axes keep what they had.
+  EXPECT_NEAR(information_of_rough_ends(kRough_m, T).information(1, 1) /
+                  information_of_rough_ends(0.0F, T).information(1, 1),
+              1.0,
+              0.02);
+}
+
+/// A wrong prediction is no scatter, or it would hold itself up.
+TEST(ScanMatcher, residuals_of_a_wrong_prediction_lose_nothing) {
+  const Pose wrong(Eigen::Quaterniond::Identity(), {0.2, 0.0, 0.0});
+  const PoseInformation sum = information_of_rough_ends(0.0F, wrong);
+  EXPECT_NEAR(
+      sum.information(0, 0) / information_of_rough_ends(0.0F, Pose{}).information(0, 0), 1.0, 1e-6);
+  EXPECT_NEAR(sum.information.ldlt().solve(sum.gradient)[0], 0.2, 1e-6);
+}
+
 }  // namespace
 }  // namespace trigpoint::lio_mapper
