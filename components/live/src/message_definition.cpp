@@ -65,6 +65,14 @@ std::string ros_name(const std::string& idl_type) {
              : idl_type.substr(0, at) + "/" + idl_type.substr(at + inner.size());
 }
 
+/// ROS 2 allows no capitals in a field's name, and its readers refuse them; CDR has no names.
+std::string in_small_letters(std::string name) {
+  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) {
+    return static_cast<char>(std::tolower(c));
+  });
+  return name;
+}
+
 bool is_primitive(const std::string& type) {
   static constexpr std::array<const char*, 12> kNames{"bool",
                                                       "int8",
@@ -147,7 +155,7 @@ class Parser {
     } else {
       field.type = ros_name(next());
     }
-    field.name = next();
+    field.name = in_small_letters(next());
     if (accept("[")) {
       field.array = "[" + next() + "]";
       expect("]");
