@@ -34,7 +34,7 @@ function sharpContext(canvas) {
 
 function drawAxisChart(canvas, statuses, axis) {
   const { context: c, width, height } = sharpContext(canvas);
-  const [left, right, top, bottom] = [38, width - 6, 4, height - 16];
+  const [left, right, top, bottom] = [42, width - 6, 7, height - 16];
   const end = statuses.length ? statuses[statuses.length - 1].t : 0;
   const begin = Math.max(statuses.length ? statuses[0].t : 0, end - kWindow_s);
   const span = Math.max(end - begin, 10);

@@ -4,15 +4,17 @@
 "use strict";
 
 const kPathStyles = {
-  gps: { name: "GPS filter", colour: "#1f6fbf", width: 2 },
-  lio: { name: "LIO, placed by the alignment", colour: "#e8772e", width: 2 },
-  fusion: { name: "fusion", colour: "#17853c", width: 3.5 },
+  gps: { colour: "#1f6fbf", width: 2 },
+  lio: { colour: "#e8772e", width: 2 },
+  fusion: { colour: "#17853c", width: 3.5 },
 };
 const kAxisNames = ["east", "north", "up"];
 const kLioHealth = ["starting", "ok", "degraded", "lost", "stale"];
 const kGpsHealth = ["starting", "ok", "degraded", "dead reckoning", "stale", "fault"];
 const kGnssClasses = ["none", "unknown", "code", "SBAS", "float", "fixed"];
 const kNewDrive_s = 5; // data time that goes back by more: another drive began
+const kFrame_ms = 50; // between two pictures: the computer may be the robot's own
+const kGap_m = 4; // further apart than this, and some were lost between: not joined
 const kMostWaitingClouds = 100; // before the first alignment
 
 const byId = (id) => document.getElementById(id);
@@ -24,7 +26,7 @@ let follow = true;
 let now_s = 0;
 let waitingClouds = []; // of before the alignment, in odom
 let dirty = true;
-let received = 0;
+let drawn_ms = 0;
 
 function clearAll() {
   history_.clear();
@@ -56,7 +58,6 @@ function onCloud(cloud) {
 }
 
 const counted = (handle) => (message) => {
-  received += 1;
   dirty = true;
   handle(message);
 };
@@ -93,18 +94,20 @@ function projector(matrix, width, height) {
   };
 }
 
-function drawPath(c, project, points, style) {
+function drawPath(c, project, points, spacing_m, style) {
   c.strokeStyle = style.colour;
   c.lineWidth = style.width;
   c.lineJoin = "round";
   c.beginPath();
-  let drawing = false;
+  const longest_m = kGap_m + 2 * spacing_m;
+  let before = null;
   for (const point of points) {
     const at = project(point);
     if (at) {
-      drawing ? c.lineTo(...at) : c.moveTo(...at);
+      const joined = before && Math.hypot(point[0] - before[0], point[1] - before[1], point[2] - before[2]) < longest_m;
+      joined ? c.lineTo(...at) : c.moveTo(...at);
     }
-    drawing = at !== null;
+    before = at ? point : null;
   }
   c.stroke();
 }
@@ -174,7 +177,7 @@ function drawView() {
   drawFixes(context, project);
   for (const key of ["gps", "lio", "fusion"]) {
     if (byId(`show-${key}`).checked) {
-      drawPath(context, project, paths[key], kPathStyles[key]);
+      drawPath(context, project, paths[key], history_.paths[key].spacing_m, kPathStyles[key]);
     }
   }
   drawRobot(context, project, robot);
@@ -211,9 +214,10 @@ function fillTables() {
   byId("time").textContent = now_s > 0 ? new Date(now_s * 1000).toISOString().replace("T", " ").slice(0, 19) + " UTC (data)" : "";
 }
 
-function draw() {
-  if (dirty) {
+function draw(t_ms) {
+  if (dirty && t_ms - drawn_ms >= kFrame_ms) {
     dirty = false;
+    drawn_ms = t_ms;
     drawView();
   }
   requestAnimationFrame(draw);
@@ -277,7 +281,7 @@ function start() {
     byId("state").className = connected ? "good" : "bad";
   }, onTime);
   setInterval(drawSlowly, 500);
-  draw();
+  requestAnimationFrame(draw);
 }
 
 start();

@@ -1,18 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
 // A client of another house: npm's ws, and Foxglove's own parser and reader of CDR.
-//   node foxglove_client.mjs NODE_MODULES URL SUBPROTOCOL TOPIC COUNT
-// Prints what the server says, and COUNT messages of TOPIC as JSON.
+//   node foxglove_client.mjs NODE_MODULES URL SUBPROTOCOL TOPIC COUNT CDR_JS
+// Prints what the server says, and COUNT messages of TOPIC as JSON; compares with what the live view's own
+// page reads of the same bytes.
 import { createRequire } from "node:module";
-const [modules, url, subprotocol, topic, count] = process.argv.slice(2);
+const [modules, url, subprotocol, topic, count, cdrFile] = process.argv.slice(2);
 const require = createRequire(modules + "/");
 const { WebSocket } = require("ws");
 const { parse } = require("@foxglove/rosmsg");
+const { parseSchema, decodeCdr } = require(cdrFile);
 const { MessageReader } = require("@foxglove/rosmsg2-serialization");
 
 const client = new WebSocket(url, [subprotocol]);
 client.binaryType = "arraybuffer";
 let reader;
+let ownTypes;
 let left = Number(count);
 const plain = (_, value) =>
   typeof value === "bigint" ? Number(value) : ArrayBuffer.isView(value) ? Array.from(value) : value;
@@ -28,6 +31,7 @@ function onText(message) {
     }
     const wanted = message.channels.find((channel) => channel.topic === topic);
     reader = new MessageReader(parse(wanted.schema, { ros2: true }));
+    ownTypes = parseSchema(wanted.schema);
     client.send(JSON.stringify({ op: "subscribe", subscriptions: [{ id: 7, channelId: wanted.id }] }));
   }
 }
@@ -42,7 +46,11 @@ client.on("message", (data, isBinary) => {
     return;
   }
   const message = reader.readMessage(new Uint8Array(data, 13));
-  console.log(`message ${view.getUint32(1, true)} ${view.getBigUint64(5, true)} ${JSON.stringify(message, plain)}`);
+  // Foxglove's reader calls the nanoseconds of a time nsec.
+  const text = JSON.stringify(message, plain).replaceAll('"nsec":', '"nanosec":');
+  const own = JSON.stringify(decodeCdr(ownTypes, new Uint8Array(data, 13)), plain);
+  console.log(own === text ? "the page reads the same" : "the page reads " + own);
+  console.log(`message ${view.getUint32(1, true)} ${view.getBigUint64(5, true)} ${text}`);
   if (--left === 0) {
     client.close();
   }

@@ -20,7 +20,7 @@ namespace trigpoint::live {
 struct Channel {
   std::string topic;        ///< "/lio/odometry"
   std::string schema_name;  ///< "nav_msgs/msg/Odometry"; must be in idl/
-  std::size_t depth{64};    ///< messages of it that may wait for a slow client; the newest are kept
+  std::size_t depth{1000};  ///< messages of it that may wait for a slow client; the newest are kept
   bool latched{false};      ///< the newest message goes to whoever subscribes later
 };
 
