@@ -4,10 +4,10 @@
 "use strict";
 
 const kPathStyles = {
-  gps: { colour: "#1f6fbf", width: 2 },
-  lio: { colour: "#e8772e", width: 2 },
+  lio: { colour: "#e8772e", width: 6 },
   fusion: { colour: "#17853c", width: 3.5 },
-};
+  gps: { colour: "#1f6fbf", width: 1.5 },
+}; // drawn in this order, so that each is seen where they lie over each other
 const kAxisNames = ["east", "north", "up"];
 const kLioHealth = ["starting", "ok", "degraded", "lost", "stale"];
 const kGpsHealth = ["starting", "ok", "degraded", "dead reckoning", "stale", "fault"];
@@ -175,9 +175,9 @@ function drawView() {
   const { context } = sharpContext(byId("overlay"));
   const project = projector(matrix, width, height);
   drawFixes(context, project);
-  for (const key of ["gps", "lio", "fusion"]) {
+  for (const [key, style] of Object.entries(kPathStyles)) {
     if (byId(`show-${key}`).checked) {
-      drawPath(context, project, paths[key], history_.paths[key].spacing_m, kPathStyles[key]);
+      drawPath(context, project, paths[key], history_.paths[key].spacing_m, style);
     }
   }
   drawRobot(context, project, robot);
@@ -260,7 +260,7 @@ function listenToMouse() {
   byId("whole").onclick = () => (showWhole(), changed());
   byId("clear").onclick = clearAll;
   byId("follow").onchange = (event) => ((follow = event.target.checked), changed());
-  ["gps", "lio", "fusion"].forEach((key) => (byId(`show-${key}`).onchange = changed));
+  Object.keys(kPathStyles).forEach((key) => (byId(`show-${key}`).onchange = changed));
   window.addEventListener("resize", changed);
 }
 
