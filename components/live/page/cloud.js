@@ -100,7 +100,7 @@ class CloudPainter {
   // Throws where there is no WebGL.
   constructor(canvas, store) {
     this.store = store;
-    this.gl = canvas.getContext("webgl", { antialias: true, preserveDrawingBuffer: true });
+    this.gl = canvas.getContext("webgl", { antialias: true });
     if (!this.gl) {
       throw new Error("this browser has no WebGL: the cloud is not shown");
     }

@@ -24,32 +24,12 @@ using namespace std::chrono_literals;
 
 constexpr std::size_t kBulkDepth = 2;  // clouds that may wait for a slow browser
 constexpr auto kTimePeriod = 100ms;    // how often browsers are told the time
-constexpr auto kClockSilence = 2s;     // after this the wall's clock is shown again
 
 Nanoseconds wall_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
              std::chrono::system_clock::now().time_since_epoch())
       .count();
 }
-
-/// The time of the data: the topic `clock` while somebody writes it, else the wall's.
-class DataTime {
- public:
-  void heard(Nanoseconds clock_ns) {
-    clock_ns_ = clock_ns;
-    heard_ns_ = wall_ns();
-  }
-
-  Nanoseconds now_ns() const {
-    const Nanoseconds wall = wall_ns();
-    const bool simulated = wall - heard_ns_ < std::chrono::nanoseconds(kClockSilence).count();
-    return simulated ? clock_ns_.load() : wall;
-  }
-
- private:
-  std::atomic<Nanoseconds> clock_ns_{0};
-  std::atomic<Nanoseconds> heard_ns_{0};
-};
 
 Channel channel_of(const recording::KnownTopic& topic) {
   Channel channel;
@@ -86,9 +66,9 @@ class LiveView {
         clock_(participant_,
                bus::topics::clock,
                [this](const rosgraph_msgs::msg::Clock& message, const bus::MessageInfo&) {
-                 time_.heard(bus::from_message(message));
+                 clock_ns_ = bus::from_message(message);
                }) {
-    loop.every(kTimePeriod, [this] { server_.publish_time(time_.now_ns()); });
+    loop.every(kTimePeriod, [this] { server_.publish_time(now_ns()); });
   }
 
   std::uint16_t port() const { return server_.port(); }
@@ -100,6 +80,13 @@ class LiveView {
     std::vector<Channel> all;
     std::transform(topics_.begin(), topics_.end(), std::back_inserter(all), channel_of);
     return all;
+  }
+
+  /// The time of the data: that of the topic `clock` as long as somebody writes it, else the
+  /// wall's.
+  Nanoseconds now_ns() const {
+    const Nanoseconds clock = clock_ns_;
+    return clock > 0 && clock_.matched() > 0 ? clock : wall_ns();
   }
 
   void want(std::size_t channel, bool wanted) {
@@ -114,12 +101,12 @@ class LiveView {
         topic.ros_type,
         reading_qos(topic),
         [this, channel](bus::SerializedMessage& cdr, const bus::MessageInfo&) {
-          server_.publish(channel, time_.now_ns(), std::move(cdr));
+          server_.publish(channel, now_ns(), std::move(cdr));
         });
   }
 
   const std::vector<recording::KnownTopic> topics_;
-  DataTime time_;
+  std::atomic<Nanoseconds> clock_ns_{0};
   bus::Participant participant_;
   LiveServer server_;
   bus::Subscription<rosgraph_msgs::msg::Clock> clock_;

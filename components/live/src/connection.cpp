@@ -113,6 +113,7 @@ void Connection::on_upgraded(Error error) {
     close();
     return;
   }
+  buffer_.clear();  // nobody may speak before the handshake is done
   outbox_.push_control(text_frame(hub_.server_info()));
   outbox_.push_control(text_frame(hub_.advertisement()));
   hub_.joined(shared_from_this());
@@ -195,16 +196,14 @@ void Connection::complain(const std::string& text) {
 void Connection::send(std::size_t channel, Nanoseconds stamp_ns, const Payload& cdr) {
   const auto found = subscription_of_.find(channel);
   if (found != subscription_of_.end()) {
-    push(data_frame(found->second, stamp_ns, cdr), hub_.channels()[channel].depth);
+    hub_.count(
+        0, outbox_.push(data_frame(found->second, stamp_ns, cdr), hub_.channels()[channel].depth));
+    write_next();
   }
 }
 
 void Connection::send_time(Nanoseconds now_ns) {
-  push(time_frame(now_ns), 1);
-}
-
-void Connection::push(Frame frame, std::size_t depth) {
-  hub_.count(0, outbox_.push(std::move(frame), depth));
+  outbox_.push(time_frame(now_ns), 1);
   write_next();
 }
 
@@ -235,7 +234,7 @@ void Connection::on_written(Error error) {
     close();
     return;
   }
-  hub_.count(current_.text ? 0 : 1, 0);
+  hub_.count(current_.text || current_.stream == kTimeStream ? 0 : 1, 0);
   current_ = Frame{};
   write_next();
 }

@@ -62,7 +62,6 @@ class Connection : public std::enable_shared_from_this<Connection> {
   void subscribe(const Subscription& subscription);
   void unsubscribe(std::uint32_t id);
   void complain(const std::string& text);
-  void push(Frame frame, std::size_t depth);
   void write_next();
   void on_written(Error error);
 

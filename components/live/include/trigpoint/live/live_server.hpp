@@ -33,7 +33,7 @@ struct ServerOptions {
 
 struct Counters {
   std::uint64_t clients{0};      ///< WebSocket clients now
-  std::uint64_t sent{0};         ///< messages handed to the network
+  std::uint64_t sent{0};         ///< messages of channels handed to the network
   std::uint64_t dropped{0};      ///< messages that a slow client did not get
   std::uint64_t turned_away{0};  ///< connections beyond max_clients
 };
