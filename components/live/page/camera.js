@@ -75,6 +75,6 @@ class Camera {
   fit(low, high, aspect) {
     this.target = low.map((value, axis) => (value + high[axis]) / 2);
     const size = Math.max((high[0] - low[0]) / aspect, high[1] - low[1], 20);
-    this.distance_m = (0.6 * size) / Math.tan(kFieldOfView_rad / 2);
+    this.distance_m = (0.72 * size) / Math.tan(kFieldOfView_rad / 2);
   }
 }
