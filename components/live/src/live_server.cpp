@@ -2,6 +2,8 @@
 // Copyright the Trigpoint developers
 #include "trigpoint/live/live_server.hpp"
 
+#include "trigpoint/base/config.hpp"
+
 #include "connection.hpp"
 #include "protocol.hpp"
 #include <boost/asio/io_context.hpp>
@@ -38,9 +40,9 @@ tcp::endpoint endpoint_of(const ServerOptions& options) {
   Error error;
   const auto address = asio::ip::make_address(options.bind_address, error);
   if (error) {
-    throw std::runtime_error("'" + options.bind_address +
-                             "' is no IP address to listen on; 127.0.0.1 is this computer alone, "
-                             "0.0.0.0 every network");
+    throw ConfigError("'" + options.bind_address +
+                      "' is no IP address to listen on; 127.0.0.1 is this computer alone, 0.0.0.0 "
+                      "every network");
   }
   return {address, options.port};
 }

@@ -91,9 +91,9 @@ std::string http(std::uint16_t port, const std::string& request) {
   asio::io_context io;
   asio::ip::tcp::socket socket(io);
   socket.connect(local(port));
-  asio::write(socket, asio::buffer(request));
   std::string answer;
-  beast::error_code end_of_file;
+  beast::error_code end_of_file;  // or a server that closes before it has heard all
+  asio::write(socket, asio::buffer(request), end_of_file);
   asio::read(socket, asio::dynamic_buffer(answer), end_of_file);
   return answer;
 }
