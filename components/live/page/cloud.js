@@ -67,7 +67,9 @@ class CloudStore {
       const y = t[4] * px + t[5] * py + t[6] * pz + t[7];
       const z = t[8] * px + t[9] * py + t[10] * pz + t[11];
       if (Number.isFinite(x + y + z) && this.claim(x, y, z)) {
-        this.points.set([x, y, z], 3 * this.next);
+        this.points[3 * this.next] = x;
+        this.points[3 * this.next + 1] = y;
+        this.points[3 * this.next + 2] = z;
         if (++this.next === kMostPoints) {
           this.taken.fill(0);
           this.next = 0;
