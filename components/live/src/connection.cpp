@@ -24,6 +24,12 @@ constexpr std::size_t kMostControls = 200;          // answers that wait for a c
 // Little, so that what a slow client sees is not old; enough for 1 GB/s on this computer.
 constexpr int kSocketBuffer_bytes = 1 << 20;
 
+/// With or without words for the page's script behind a question mark.
+bool asks_for_page(beast::string_view target) {
+  const auto path = target.substr(0, target.find('?'));
+  return path == "/" || path == "/index.html";
+}
+
 }  // namespace
 
 Connection::Connection(boost::asio::ip::tcp::socket socket, std::size_t max_queued_bytes, Hub& hub)
@@ -55,7 +61,7 @@ void Connection::on_request(Error error) {
     upgrade(request);
   } else if (request.method() != http::verb::get) {
     respond(http::status::method_not_allowed, "text/plain", "only GET\n");
-  } else if (request.target() == "/" || request.target() == "/index.html") {
+  } else if (asks_for_page(request.target())) {
     respond(http::status::ok, "text/html; charset=utf-8", embedded_page());
   } else {
     respond(http::status::not_found, "text/plain", "there is only /\n");

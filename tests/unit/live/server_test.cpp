@@ -266,6 +266,12 @@ TEST_F(Server, has_a_page_that_needs_no_other_file) {
   }
 }
 
+TEST_F(Server, leaves_what_is_behind_a_question_mark_to_the_page) {
+  make();
+  EXPECT_THAT(test::http(server->port(), "GET /?view=top HTTP/1.1\r\n\r\n"), HasSubstr(" 200 "));
+  EXPECT_THAT(test::http(server->port(), "GET /x?/ HTTP/1.1\r\n\r\n"), HasSubstr(" 404 "));
+}
+
 TEST_F(Server, refuses_other_requests) {
   make();
   EXPECT_THAT(test::http(server->port(), "GET /../etc/passwd HTTP/1.1\r\n\r\n"),
