@@ -91,6 +91,7 @@ TEST(Command, every_verb_has_help) {
                            "info",
                            "play",
                            "record",
+                           "live",
                            "evaluate",
                            "report",
                            "export",

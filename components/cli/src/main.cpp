@@ -78,6 +78,7 @@ int main(int argc, char** argv) {
   cli::add_info(app, chosen);
   cli::add_play(app, chosen);
   cli::add_record(app, chosen);
+  cli::add_live(app, chosen);
   cli::add_evaluate(app, chosen);
   cli::add_report(app, chosen);
   cli::add_export(app, chosen);
