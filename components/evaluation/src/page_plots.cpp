@@ -25,6 +25,8 @@ constexpr std::array<const char*, 3> kAxisNames{"east", "north", "up"};
 /// By AxisSource.
 constexpr std::array<const char*, 4> kSourceNames{"none", "lio", "fused", "gps"};
 constexpr std::size_t kMostKinds = 8;  ///< rows of verdicts; the rarest share the last
+constexpr double kNameInRow = 0.3;     ///< parts of a row from its upper edge
+constexpr double kDotsInRow = 0.75;
 
 class TimePlots {
  public:
@@ -197,9 +199,13 @@ std::string plot_uncertainty(const SessionData& data) {
 }
 
 std::string kind_of_verdict(const FixVerdict& verdict) {
+  for (const auto& [begin, name] : {std::pair{"rows:", "used, rows for the mapper"},
+                                    std::pair{"no row:", "no row on any axis"}}) {
+    if (verdict.reason.rfind(begin, 0) == 0) {
+      return name;
+    }
+  }
   std::string kind = verdict.reason.substr(0, verdict.reason.find_first_of(",;"));
-  const bool is_row = kind.rfind("rows:", 0) == 0 || kind.rfind("no row:", 0) == 0;
-  kind = is_row ? kind.substr(0, kind.find(':')) : kind;
   // Numbers make a kind of their own of every fix. Digits within words are names.
   for (std::size_t i = 0; i < kind.size(); ++i) {
     const bool begins = std::isdigit(static_cast<unsigned char>(kind[i])) != 0 &&
@@ -238,20 +244,20 @@ std::string plot_verdicts(const SessionData& data) {
                   "Verdicts of the gate on fixes",
                   time.time_axis(),
                   {0.0, rows, false, ""},
-                  900.0 * rows + 500.0);
+                  900.0 * rows);
   drawing.add_bands(time.dropouts());
   PlotCurve used{"used", "used", {}, Drawn::kDots};
   PlotCurve refused{"refused", "not used", {}, Drawn::kDots};
   for (const auto& verdict : verdicts) {
     const auto at = std::find(kinds.begin(), kinds.end() - 1, kind_of_verdict(verdict));
-    const double y = rows - 0.5 - static_cast<double>(at - kinds.begin());
+    const double y = rows - kDotsInRow - static_cast<double>(at - kinds.begin());
     (verdict.used ? used : refused).points.emplace_back(time.time_s(verdict.fix_stamp_ns), y);
   }
   drawing.add(used);
   drawing.add(refused);
   std::vector<Mark> marks;
   for (std::size_t i = 0; i < kinds.size(); ++i) {
-    marks.push_back({rows - 0.5 - static_cast<double>(i), kinds[i]});
+    marks.push_back({rows - kNameInRow - static_cast<double>(i), kinds[i]});
   }
   drawing.set_y_marks(marks);
   return drawing.html("time rows");

@@ -26,7 +26,7 @@ std::string plot_height(const SessionData& data);
 std::string plot_error(const SessionData& data);
 std::string plot_scan_times(const SessionData& data);
 
-/// Kinds of verdicts as gate.csv tells them, e.g. "rows: east sigma 0.1 m <= ..." is "rows".
+/// Of a verdict as gate.csv tells it: without the numbers that make it one of its own.
 std::string kind_of_verdict(const FixVerdict& verdict);
 
 /// The last verdict on each fix that gate.csv tells of.

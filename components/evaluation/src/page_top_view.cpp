@@ -70,14 +70,18 @@ PlotCurve fixes_curve(const SessionData& data, bool used) {
 
 std::vector<PlotCurve> curves_of(const SessionData& data) {
   const auto T_map_odom = lio_placement(data);
-  std::vector<PlotCurve> curves{{"truth wide", "truth", places(data.truth)},
-                                {"gps", "gps filter", places(data.gps)},
-                                {"fused wide", "fused", places(data.fused)},
-                                {"lio",
-                                 T_map_odom ? "lio (yaw + translation)" : "lio (odom, not aligned)",
-                                 places(data.lio, T_map_odom.value_or(Pose{}))}};
+  std::vector<PlotCurve> curves;
   if (data.datum) {
     curves.push_back(fixes_curve(data, true));
+  }
+  curves.push_back({"truth", "truth", places(data.truth)});
+  curves.push_back({"gps", "gps filter", places(data.gps)});
+  curves.push_back({"fused", "fused", places(data.fused)});
+  // Over the wider fused: where the two agree both are seen.
+  curves.push_back({"lio",
+                    T_map_odom ? "lio (yaw + translation)" : "lio (odom, not aligned)",
+                    places(data.lio, T_map_odom.value_or(Pose{}))});
+  if (data.datum) {
     curves.push_back(fixes_curve(data, false));
     const auto withheld = fix_positions(data.fixes, *data.datum, FixChoice::kWithheld);
     curves.push_back({"withheld", "withheld fixes", places(withheld), Drawn::kDots});

@@ -91,7 +91,7 @@
     uniform float cut_m, px_per_m, size, by_intensity;
     varying vec3 colour;
     vec3 ramp(float t) {
-      vec3 c = mix(vec3(0.27, 0.36, 0.66), vec3(0.16, 0.58, 0.72), clamp(t * 4.0, 0.0, 1.0));
+      vec3 c = mix(vec3(0.36, 0.45, 0.72), vec3(0.16, 0.58, 0.72), clamp(t * 4.0, 0.0, 1.0));
       c = mix(c, vec3(0.42, 0.76, 0.62), clamp(t * 4.0 - 1.0, 0.0, 1.0));
       c = mix(c, vec3(0.93, 0.86, 0.55), clamp(t * 4.0 - 2.0, 0.0, 1.0));
       return mix(c, vec3(0.93, 0.55, 0.42), clamp(t * 4.0 - 3.0, 0.0, 1.0));
@@ -102,7 +102,7 @@
       gl_PointSize = clamp(size * px_per_m / max(gl_Position.w, 0.01), 1.0, 24.0);
       float t = (p.z - heights.x) / (heights.y - heights.x);
       colour = by_intensity > 0.5 ? vec3(0.12 + 0.88 * intensity)
-                                  : ramp(t) * (0.6 + 0.4 * intensity);
+                                  : ramp(t) * (0.72 + 0.38 * intensity);
     }`;
   const POINTS_FRAGMENT = `
     precision mediump float;
@@ -280,6 +280,7 @@
     gl.depthFunc(gl.LEQUAL);
     draw_points(clip_map);
     // Once more through roofs and trees, faintly.
+    gl.depthMask(false);  // the later ones lie over the earlier ones where they agree
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
     gl.disable(gl.DEPTH_TEST);
@@ -287,6 +288,7 @@
     gl.enable(gl.DEPTH_TEST);
     draw_tracks(clip_map, 1);
     gl.disable(gl.BLEND);
+    gl.depthMask(true);
     gl.disable(gl.DEPTH_TEST);
     if (spot) draw_spot(clip_map);
     canvas.dataset.drawn = String(scene.count);
