@@ -57,7 +57,8 @@
   const extent_m = Math.max(Math.hypot(high[0] - low[0], high[1] - low[1]), 30);
   // Along the shorter side, so that the longer one lies across the picture.
   const whole = {
-    target: centre, yaw: high[0] - low[0] >= high[1] - low[1] ? -1.9 : -0.35, pitch: 0.72, distance: 1.05 * extent_m,
+    target: centre, yaw: high[0] - low[0] >= high[1] - low[1] ? -1.9 : -0.35, pitch: 0.72,
+    distance: extent_m * Math.max(1, (1.2 * canvas.clientHeight) / Math.max(canvas.clientWidth, 1)),
   };
   let camera = {...whole};
 
