@@ -19,6 +19,8 @@ namespace {
 
 namespace file = exporter::session_file;
 
+constexpr const char* kTimesTitle = "Times per scan";  ///< of the section of report.md
+
 /// The page may load nothing, not even from its own folder.
 constexpr const char* kHead =
     "<meta charset=\"utf-8\"/>\n"
@@ -142,13 +144,15 @@ std::vector<Part> parts_of(const SessionData& data,
       {"trajectories", "Trajectories", plot_top_view(data, map)},
       {"map-3d", "Map in 3-D", ""},
       {"uncertainty", "Uncertainty and the gate", plot_uncertainty(data) + plot_verdicts(data)},
-      {"over-time", "Height and error", plot_height(data) + plot_error(data)},
-      {"scan-time", "Time per scan", plot_scan_times(data)}};
+      {"over-time", "Height and error", plot_height(data) + plot_error(data)}};
   if (const auto scene = scene_of(data, map); !scene.empty()) {
     parts[1].body = scene_part(scene);
   }
   for (const auto& section : content.sections) {
     parts.push_back(part_of(section));
+    if (parts.back().title == kTimesTitle) {
+      parts.back().body += plot_scan_times(data);
+    }
   }
   parts.erase(
       std::remove_if(parts.begin(), parts.end(), [](const Part& p) { return p.body.empty(); }),
