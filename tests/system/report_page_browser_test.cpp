@@ -80,6 +80,14 @@ const point_at = (element, kind, u, v, more = {}) => {
   document.getElementById('view-top').click();
   await soon();
   tell('from_above', differing(turned, pixels()));
+  const picture = new Image();
+  picture.src = document.querySelector('#top-view image').getAttribute('href');
+  await picture.decode();
+  const flat = Object.assign(document.createElement('canvas'), {width: picture.width, height: picture.height}).getContext('2d');
+  flat.drawImage(picture, 0, 0);
+  const cells = flat.getImageData(0, 0, picture.width, picture.height).data;
+  tell('picture_cells', picture.width * picture.height);
+  tell('picture_drawn', cells.filter((value, i) => i % 4 === 3 && value > 0).length);
   const error = document.querySelector('#error .drawing');
   error.setPointerCapture = () => {};
   point_at(error, 'pointermove', 0.25, 0.5);
@@ -170,6 +178,8 @@ TEST_F(ReportInABrowser, is_drawn_without_complaint_and_answers_to_the_mouse) {
   EXPECT_GT(number(seen, "drawn"), 0.02 * pixels);
   EXPECT_GT(number(seen, "turned"), 0.02 * pixels);
   EXPECT_GT(number(seen, "from_above"), 0.02 * pixels);
+  EXPECT_GT(number(seen, "picture_drawn"), 0.02 * number(seen, "picture_cells"));
+  EXPECT_LT(number(seen, "picture_drawn"), 0.50 * number(seen, "picture_cells"));
   // At 30 s of 120 s fused was made 3 cm off, and lio 0.01 m/s * (30 - 60) s after its mean.
   EXPECT_THAT(seen.at("tip"), HasSubstr("t = 30 s"));
   EXPECT_THAT(seen.at("tip"), HasSubstr("fused: 0.03"));

@@ -9,8 +9,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
+#include <limits>
 #include <map>
+#include <utility>
 
 namespace trigpoint::evaluation {
 
@@ -130,7 +133,7 @@ std::string plot(const TimePlots& time,
     return "";
   }
   SvgPlot drawing(id, title, time.time_axis(), y);
-  drawing.add_bands(time.dropouts());
+  drawing.add_bands(time.dropouts(), "GPS dropout");
   drawing.add_strip(strip);
   for (const auto& curve : curves) {
     drawing.add(curve);
@@ -245,7 +248,7 @@ std::string plot_verdicts(const SessionData& data) {
                   time.time_axis(),
                   {0.0, rows, false, ""},
                   900.0 * rows);
-  drawing.add_bands(time.dropouts());
+  drawing.add_bands(time.dropouts(), "GPS dropout");
   PlotCurve used{"used", "used", {}, Drawn::kDots};
   PlotCurve refused{"refused", "not used", {}, Drawn::kDots};
   for (const auto& verdict : verdicts) {

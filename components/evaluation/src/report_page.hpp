@@ -21,7 +21,7 @@ struct PageContent {
   std::vector<std::string> failures;
 };
 
-/// The page's text. A map that cannot be read is told on the page and added to `problems`.
+/// The page's text. A map that cannot be read is told on the page, among the problems.
 std::string make_page(const SessionData& data, const PageContent& content);
 
 }  // namespace trigpoint::evaluation

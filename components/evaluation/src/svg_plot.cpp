@@ -15,6 +15,7 @@ namespace {
 
 constexpr int kMostMarksX = 8;
 constexpr int kMostMarksY = 5;
+constexpr long kDotStep = 4;         ///< dots nearer to each other are one
 constexpr double kStripPart = 0.07;  ///< of the height
 
 std::string text_of(const char* format, double value) {
@@ -91,6 +92,9 @@ std::string SvgPlot::path_of(const PlotCurve& curve) const {
     const long next_x = std::lround(x_of(point.x()));
     const long next_y = std::lround(y_of(point.y()));
     if (curve.drawn == Drawn::kDots) {
+      if (pen_down && next_x / kDotStep == x / kDotStep && next_y / kDotStep == y / kDotStep) {
+        continue;  // it would lie on the one before
+      }
       path += "M" + std::to_string(next_x) + " " + std::to_string(next_y) + "h0";
     } else if (!pen_down) {
       path += "M" + std::to_string(next_x) + " " + std::to_string(next_y) + "l0 0";
@@ -124,12 +128,12 @@ std::string SvgPlot::rect_of(const Band& band, double top, double bottom) const 
          text_of("%.0f", bottom - top) + "\"/>\n";
 }
 
-void SvgPlot::add_bands(const std::vector<Band>& bands) {
+void SvgPlot::add_bands(const std::vector<Band>& bands, const std::string& title) {
   for (const auto& band : bands) {
     back_ += rect_of(band, 0.0, height_);
   }
   if (!bands.empty()) {
-    add_legend(bands.front().style, "GPS dropout", "box");
+    add_legend(bands.front().style, title, "box");
   }
 }
 

@@ -56,8 +56,8 @@ class SvgPlot {
   SvgPlot(std::string id, std::string title, Axis x, Axis y, double height = 8'000.0);
 
   void add(const PlotCurve& curve);
-  /// Over the whole height, behind the curves.
-  void add_bands(const std::vector<Band>& bands);
+  /// Over the whole height, behind the curves; `title` is theirs in the legend.
+  void add_bands(const std::vector<Band>& bands, const std::string& title);
   /// In a row along the lower edge.
   void add_strip(const std::vector<Band>& bands);
 
