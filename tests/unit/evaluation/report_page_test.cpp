@@ -9,11 +9,13 @@
 #include "made_session.hpp"
 #include "page_plots.hpp"
 #include "page_scene.hpp"
+#include "png.hpp"
 #include "svg_plot.hpp"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <regex>
 #include <set>
 
@@ -260,6 +262,60 @@ TEST(Base64, equals_the_examples_of_its_standard) {
   for (const auto& [text, wanted] : examples) {
     EXPECT_EQ(html::base64(std::vector<char>(text.begin(), text.end())), wanted);
   }
+}
+
+/// Chunks of a PNG by type; those of one type follow each other.
+std::map<std::string, std::string> chunks_of(const std::string& png) {
+  std::map<std::string, std::string> chunks;
+  const auto number_at = [&](std::size_t at) {
+    std::uint32_t number = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+      number = number << 8U | static_cast<unsigned char>(png.at(at + i));
+    }
+    return number;
+  };
+  for (std::size_t at = 8; at < png.size();) {
+    const std::size_t size = number_at(at);
+    chunks[png.substr(at + 4, 4)] += png.substr(at + 8, size);
+    at += 12 + size;
+  }
+  return chunks;
+}
+
+/// RFC 1950's sums in closed form: a = 1 + sum d_i, b = n + sum (n - i) d_i.
+std::uint32_t adler_in_closed_form(const std::string& data) {
+  std::uint64_t a = 1;
+  std::uint64_t b = data.size();
+  for (std::size_t i = 0; i < data.size(); ++i) {
+    a += static_cast<unsigned char>(data[i]);
+    b += (data.size() - i) * static_cast<unsigned char>(data[i]);
+  }
+  return static_cast<std::uint32_t>(b % 65'521 << 16U | a % 65'521);
+}
+
+TEST(Png, holds_the_cells_from_the_north_and_its_check_sums) {
+  MapRaster raster;
+  raster.columns = 3;
+  raster.rows = 2;
+  raster.darkness = {0.0F, 0.0F, 0.5F, 1.0F, 0.001F, 0.0F};  // the second row is the northern one
+  const auto bytes = png_of(raster);
+  const std::string png(bytes.begin(), bytes.end());
+  const auto chunks = chunks_of(png);
+  EXPECT_EQ(chunks.at("IHDR"), std::string("\0\0\0\3\0\0\0\2\4\3\0\0\0", 13));
+  EXPECT_EQ(chunks.at("PLTE").size(), 48U);
+  EXPECT_EQ(chunks.at("tRNS").size(), 16U);
+  const std::string cells("\0\xf1\0\0\0\x80", 6);
+  const std::string& zlib = chunks.at("IDAT");
+  ASSERT_EQ(zlib.size(), 2 + 5 + cells.size() + 4);  // head, head of the block, cells, sum
+  EXPECT_EQ(zlib.substr(2, 5), std::string("\1\6\0\xf9\xff", 5));
+  EXPECT_EQ(zlib.substr(7, cells.size()), cells);
+  std::uint32_t sum = 0;
+  for (const char c : zlib.substr(zlib.size() - 4)) {
+    sum = sum << 8U | static_cast<unsigned char>(c);
+  }
+  EXPECT_EQ(sum, adler_in_closed_form(cells));
+  // The CRC of every PNG's last chunk.
+  EXPECT_EQ(png.substr(png.size() - 4), "\xae\x42\x60\x82");
 }
 
 TEST(SvgPlot, draws_values_where_they_are_and_breaks_at_gaps) {
