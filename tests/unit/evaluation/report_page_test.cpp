@@ -318,6 +318,26 @@ TEST(Png, holds_the_cells_from_the_north_and_its_check_sums) {
   EXPECT_EQ(png.substr(png.size() - 4), "\xae\x42\x60\x82");
 }
 
+TEST(Png, of_many_cells_is_in_several_blocks_with_one_sum) {
+  MapRaster raster;
+  raster.columns = 400;
+  raster.rows = 400;
+  raster.darkness.assign(160'000, 1.0F);
+  const auto bytes = png_of(raster);
+  const std::string zlib = chunks_of(std::string(bytes.begin(), bytes.end())).at("IDAT");
+  const std::size_t cells_size = 400 * 201;  // two cells a byte, and one byte of filter a row
+  ASSERT_EQ(zlib.size(), 2 + 5 + 5 + cells_size + 4);
+  const std::string cells =
+      zlib.substr(7, 65'535) + zlib.substr(7 + 65'535 + 5, cells_size - 65'535);
+  std::uint32_t sum = 0;
+  for (const char c : zlib.substr(zlib.size() - 4)) {
+    sum = sum << 8U | static_cast<unsigned char>(c);
+  }
+  EXPECT_EQ(sum, adler_in_closed_form(cells));
+  EXPECT_EQ(zlib[2], 0);  // more blocks follow
+  EXPECT_EQ(zlib[7 + 65'535], 1);
+}
+
 TEST(SvgPlot, draws_values_where_they_are_and_breaks_at_gaps) {
   SvgPlot plot("p", "t", {0.0, 10.0, false, ""}, {0.0, 4.0, false, ""}, 8000.0);
   plot.add(PlotCurve{"gps", "c", {{0.0, 0.0}, {5.0, 4.0}, {6.0, NAN}, {10.0, 1.0}}});
