@@ -56,6 +56,9 @@ std::string error_tile(const PageContent& content) {
 }
 
 std::string outage_tile(const SessionData& data) {
+  if (data.accepted_fixes_ns().empty()) {
+    return tile("-", "GPS dropouts", "no fix was accepted");
+  }
   double sum_s = 0.0;
   double longest_s = 0.0;
   const auto outages = data.outages();

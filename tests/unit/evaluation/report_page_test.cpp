@@ -178,6 +178,7 @@ TEST(ReportPage, of_a_session_with_little_in_it_is_whole_too) {
   write_all(folder.file("run.yaml"), "log: a\n");
   const auto result = write_report(folder.path(), only_page());
   EXPECT_EQ(malformed(read_all(result.page_file)), "");
+  EXPECT_THAT(read_all(result.page_file), HasSubstr("no fix was accepted"));
 }
 
 TEST(ReportPage, escapes_the_names_of_logs_and_sessions) {
