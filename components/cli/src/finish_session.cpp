@@ -97,6 +97,9 @@ int finish_session(const std::string& session) {
   render_map(session);
   const evaluation::ReportResult report = evaluation::write_report(session);
   std::cout << report.text << "\n" << report.report_file << "\n";
+  if (!report.page_file.empty()) {
+    std::cout << report.page_file << "\n";
+  }
   for (const std::string& picture : report.pictures) {
     std::cout << picture << "\n";
   }

@@ -9,7 +9,7 @@ namespace trigpoint::cli {
 
 void add_report(CLI::App& app, Chosen& chosen) {
   CLI::App* verb = app.add_subcommand(
-      "report", "Render a session's map and write its report.md and pictures (anew)");
+      "report", "Render a session's map and write its report.md, report.html and pictures (anew)");
   const auto session = std::make_shared<std::string>();
   verb->add_option("SESSION", *session, "folder that bringup/run or trigpoint map has left")
       ->required()

@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
-#include "trigpoint/export/map.hpp"
-
 #include "fix_reference.hpp"
 #include "gnuplot.hpp"
 #include "map_raster.hpp"
 #include "pictures.hpp"
 
-#include <filesystem>
 #include <sstream>
 
 namespace trigpoint::evaluation {
@@ -78,13 +75,6 @@ std::vector<Curve> curves_of(const SessionData& data) {
     add({"withheld", "withheld fixes", withheld, "points pt 6 ps 0.9 lc rgb '#8e3fae'"});
   }
   return curves;
-}
-
-/// Empty when there is no map that the trajectories could be drawn over.
-PointCloud map_under(const SessionData& data) {
-  const auto map = data.path(file::kMap);
-  const bool is_in_map = data.alignment.has_value() || data.fused.empty();
-  return is_in_map && std::filesystem::exists(map) ? exporter::read_pcd(map) : PointCloud{};
 }
 
 std::string raster_command(const Picture& picture, const MapRaster& raster) {

@@ -2,13 +2,22 @@
 // Copyright the Trigpoint developers
 #include "pictures.hpp"
 
+#include "trigpoint/export/map.hpp"
+
 #include <algorithm>
+#include <filesystem>
 
 namespace trigpoint::evaluation {
 
 std::optional<Pose> lio_placement(const SessionData& data) {
   const auto& target = data.truth.empty() ? data.fused : data.truth;
   return align(associate(data.lio, target).pairs, AlignmentKind::kYawTranslation);
+}
+
+PointCloud map_under(const SessionData& data) {
+  const auto map = data.path(exporter::session_file::kMap);
+  const bool is_in_map = data.alignment.has_value() || data.fused.empty();
+  return is_in_map && std::filesystem::exists(map) ? exporter::read_pcd(map) : PointCloud{};
 }
 
 double seconds_since(Nanoseconds begin_ns, Nanoseconds stamp_ns) {

@@ -4,6 +4,8 @@
 // failed.
 #pragma once
 
+#include "trigpoint/base/measurements.hpp"
+
 #include "session_data.hpp"
 
 #include <string>
@@ -22,6 +24,9 @@ std::string draw_scan_times(const SessionData& data, const std::string& gnuplot)
 /// T that brings lio.tum into map by yaw + translation, onto truth or else onto fused.tum; none
 /// when there is nothing to bring it onto.
 std::optional<Pose> lio_placement(const SessionData& data);
+
+/// The map's points; none when there is no map that the trajectories could be drawn over.
+PointCloud map_under(const SessionData& data);
 
 /// Seconds since the session's first stamp.
 double seconds_since(Nanoseconds begin_ns, Nanoseconds stamp_ns);

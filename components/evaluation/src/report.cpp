@@ -3,6 +3,7 @@
 #include "trigpoint/evaluation/report.hpp"
 
 #include "pictures.hpp"
+#include "report_page.hpp"
 #include "report_sections.hpp"
 #include "session_data.hpp"
 #include "session_scores.hpp"
@@ -48,6 +49,32 @@ std::string print_pictures(const std::vector<std::string>& pictures) {
                       : "## Pictures\n\n" + text +
                             "Scripts and data are in plots/; `cd plots && gnuplot "
                             "trajectories.gp` draws anew.\n";
+}
+
+void write_page(const SessionData& data, const PageContent& content, ReportResult& result) {
+  const std::string path = data.path(kReportPage);
+  try {
+    exporter::write_text(path, make_page(data, content));
+    result.page_file = path;
+  } catch (const std::exception& error) {
+    std::error_code ignored;
+    std::filesystem::remove(path, ignored);  // an old one is not a new one
+    result.problems.push_back(std::string(error.what()) + ".");
+  }
+}
+
+std::string print_page(const ReportResult& result) {
+  return result.page_file.empty() ? ""
+                                  : "[" + std::string(kReportPage) + "](" + kReportPage +
+                                        ") has the same on one page, with the map in 3-D.\n";
+}
+
+std::string joined(const std::vector<std::string>& sections) {
+  std::string text;
+  for (const auto& section : sections) {
+    text += (text.empty() ? "" : "\n") + section;
+  }
+  return text;
 }
 
 /// What the gate refused most fixes for, when it used none of them; empty when it used some.
@@ -99,15 +126,24 @@ ReportResult write_report(const std::string& session_folder, const ReportOptions
   if (options.pictures) {
     draw_all(data, options, result);
   }
+  const auto scores = score_session(data);
+  const std::vector<std::string> sections{
+      print_run(data) + (data.restarts.empty() ? "" : "\n" + print_restarts(data)),
+      "## Errors\n\n" + print_scores(data, scores),
+      print_alignment(data),
+      print_gate(data),
+      print_times(data),
+      print_accounting(data, found),
+      print_map(data)};
+  if (options.page) {
+    write_page(data, {scores, sections, result.problems, result.failures}, result);
+  }
   result.text = print_list("Failed", result.failures) + print_list("Problems", result.problems) +
-                print_run(data) + "\n" + print_restarts(data) + "## Errors\n\n" +
-                print_scores(data, score_session(data)) + "\n" + print_alignment(data) + "\n" +
-                print_gate(data) + "\n" + print_times(data) + "\n" + print_accounting(data, found) +
-                "\n" + print_map(data);
+                joined(sections);
   result.report_file = data.path(file::kReport);
-  exporter::write_text(
-      result.report_file,
-      "# Session report\n\n" + result.text + "\n" + print_pictures(result.pictures));
+  exporter::write_text(result.report_file,
+                       "# Session report\n\n" + result.text + "\n" +
+                           print_pictures(result.pictures) + print_page(result));
   const bool has_trajectory = !data.fused.empty() || !data.lio.empty();
   result.complete = result.problems.empty() && has_trajectory;
   return result;

@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "report_page.hpp"
+
+#include "html.hpp"
+#include "page_files.hpp"
+#include "page_plots.hpp"
+#include "page_scene.hpp"
+#include "pictures.hpp"
+#include "table.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+
+namespace trigpoint::evaluation {
+
+namespace {
+
+namespace file = exporter::session_file;
+
+constexpr const char* kTimesTitle = "Times per scan";  ///< of the section of report.md
+
+/// The page may load nothing, not even from its own folder.
+constexpr const char* kHead =
+    "<meta charset=\"utf-8\"/>\n"
+    "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src "
+    "'unsafe-inline'; script-src 'unsafe-inline'; img-src data:\"/>\n"
+    "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n"
+    "<meta name=\"color-scheme\" content=\"light dark\"/>\n";
+
+std::string name_of_session(const SessionData& data) {
+  const auto path = std::filesystem::weakly_canonical(data.folder);
+  return path.has_filename() ? path.filename().string() : path.parent_path().filename().string();
+}
+
+std::string tile(const std::string& value, const std::string& what, const std::string& more = "") {
+  return "<div class=\"tile\"><b>" + html::escape(value) + "</b><span>" + html::escape(what) +
+         "</span>" + (more.empty() ? "" : "<small>" + html::escape(more) + "</small>") + "</div>\n";
+}
+
+/// Of fused.tum without alignment, against the best reference that there is.
+std::string error_tile(const PageContent& content) {
+  for (const auto& block : content.scores) {
+    for (const auto& evaluation : block.evaluations) {
+      if (evaluation.estimate_name == file::kFused) {
+        const auto& error = evaluation.scores.at(0).error.position_m;
+        return tile(fixed(error.rmse, 3) + " m",
+                    "RMSE of " + std::string(file::kFused),
+                    "against " + block.reference_name + ", no alignment; at most " +
+                        fixed(error.max, 3) + " m");
+      }
+    }
+  }
+  return tile("-", "RMSE", "there is nothing to measure against");
+}
+
+std::string outage_tile(const SessionData& data) {
+  if (data.accepted_fixes_ns().empty()) {
+    return tile("-", "GPS dropouts", "no fix was accepted");
+  }
+  double sum_s = 0.0;
+  double longest_s = 0.0;
+  const auto outages = data.outages();
+  for (const auto& window : outages) {
+    const double duration_s = to_seconds(window.end_ns - window.begin_ns);
+    sum_s += duration_s;
+    longest_s = std::max(longest_s, duration_s);
+  }
+  return outages.empty()
+             ? tile("none", "GPS dropouts", "of more than 2 s")
+             : tile(std::to_string(outages.size()),
+                    outages.size() == 1 ? "GPS dropout" : "GPS dropouts",
+                    fixed(sum_s, 1) + " s in all, longest " + fixed(longest_s, 1) + " s");
+}
+
+std::string tiles(const SessionData& data, const PageContent& content) {
+  std::string text = error_tile(content);
+  const auto span = data.span();
+  const double duration_s = to_seconds(span.end_ns - span.begin_ns);
+  if (!data.lio.empty()) {
+    text += tile(fixed(length_of(data.lio), 1) + " m", "driven", fixed(duration_s, 1) + " s");
+  }
+  text += outage_tile(data);
+  if (!data.gate.empty()) {
+    text += tile(std::to_string(data.gate.back().fixes_used),
+                 "fixes used",
+                 "of " + std::to_string(data.gate.back().fixes_seen) + " seen, gate mode " +
+                     data.gate.back().mode);
+  }
+  if (data.run) {
+    text += tile(fixed(data.run->data_s / data.run->wall_s, 2) + " x",
+                 "real time",
+                 fixed(data.run->wall_s, 1) + " s of processing");
+  }
+  return "<div class=\"tiles\">\n" + text + "</div>\n";
+}
+
+std::string note(const std::string& style,
+                 const std::string& heading,
+                 const std::vector<std::string>& sentences) {
+  std::string items;
+  for (const auto& sentence : sentences) {
+    items += "<li>" + html::escape(sentence) + "</li>";
+  }
+  return items.empty() ? ""
+                       : "<div class=\"note " + style + "\"><b>" + html::escape(heading) +
+                             "</b><ul>" + items + "</ul></div>\n";
+}
+
+struct Part {
+  std::string id;
+  std::string title;
+  std::string body;  ///< HTML
+};
+
+/// "## What the gate did" is what-the-gate-did.
+std::string id_of(const std::string& title) {
+  std::string id;
+  for (const char c : title) {
+    id += std::isalnum(static_cast<unsigned char>(c)) != 0
+              ? static_cast<char>(std::tolower(static_cast<unsigned char>(c)))
+              : '-';
+  }
+  return id;
+}
+
+/// A section of report.md; one without a heading is nothing.
+Part part_of(const std::string& section) {
+  const auto begin = section.find("## ");
+  const auto end = section.find('\n', begin);
+  if (begin == std::string::npos || end == std::string::npos) {
+    return {};
+  }
+  const std::string title = section.substr(begin + 3, end - begin - 3);
+  return {id_of(title), title, html::of_markdown(section.substr(end))};
+}
+
+std::string scene_part(const std::string& scene) {
+  return page_files::kScene + scene;
+}
+
+std::vector<Part> parts_of(const SessionData& data,
+                           const PageContent& content,
+                           const PointCloud& map) {
+  std::vector<Part> parts{
+      {"trajectories", "Trajectories", plot_top_view(data, map)},
+      {"map-3d", "Map in 3-D", ""},
+      {"uncertainty", "Uncertainty and the gate", plot_uncertainty(data) + plot_verdicts(data)},
+      {"over-time", "Height and error", plot_height(data) + plot_error(data)}};
+  if (const auto scene = scene_of(data, map); !scene.empty()) {
+    parts[1].body = scene_part(scene);
+  }
+  for (const auto& section : content.sections) {
+    parts.push_back(part_of(section));
+    if (parts.back().title == kTimesTitle) {
+      parts.back().body += plot_scan_times(data);
+    }
+  }
+  parts.erase(
+      std::remove_if(parts.begin(), parts.end(), [](const Part& p) { return p.body.empty(); }),
+      parts.end());
+  return parts;
+}
+
+std::string subtitle(const SessionData& data) {
+  std::string text;
+  if (data.run) {
+    text = "Log " + data.run->log + ", " + fixed(data.run->data_s, 1) + " s; gate mode " +
+           data.run->mode + ", GPS filter " + data.run->gps_filter + ". ";
+  }
+  return text + "t = 0 is " + exporter::stamp_text(data.span().begin_ns) +
+         " s of the sensors' time.";
+}
+
+}  // namespace
+
+std::string make_page(const SessionData& data, const PageContent& content) {
+  auto problems = content.problems;
+  PointCloud map;
+  try {
+    map = map_under(data);
+  } catch (const std::exception& error) {
+    const std::string problem = std::string(error.what()) + ".";
+    if (std::find(problems.begin(), problems.end(), problem) == problems.end()) {
+      problems.push_back(problem);
+    }
+  }
+  const std::string name = html::escape(name_of_session(data));
+  std::string nav;
+  std::string body;
+  for (const auto& part : parts_of(data, content, map)) {
+    const std::string title = html::escape(part.title);
+    nav += "<a href=\"#" + part.id + "\">" + title + "</a>";
+    body +=
+        "<section id=\"" + part.id + "\">\n<h2>" + title + "</h2>\n" + part.body + "</section>\n";
+  }
+  return "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n" + std::string(kHead) + "<title>" + name +
+         " - Trigpoint session report</title>\n<style>\n" + page_files::kStyle +
+         "</style>\n</head>\n<body>\n<header><p class=\"kind\">Trigpoint session report</p><h1>" +
+         name + "</h1>\n<p>" + html::escape(subtitle(data)) + "</p>\n</header>\n<nav>" + nav +
+         "</nav>\n<main>\n" + note("failed", "Failed", content.failures) +
+         note("problem", "Problems", problems) + tiles(data, content) + body +
+         "</main>\n<script>\n" + page_files::kPlots + "</script>\n<script>\n" + page_files::kMap3d +
+         "</script>\n</body>\n</html>\n";
+}
+
+}  // namespace trigpoint::evaluation
