@@ -15,6 +15,8 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <functional>
+#include <thread>
 
 namespace trigpoint::bus {
 namespace {
@@ -63,6 +65,15 @@ std::string ros_type(const char* between) {
   return dds.substr(0, at) + between + dds.substr(name, dds.size() - name - 1);
 }
 
+/// The first samples after a match may be lost, so once is not enough.
+void repeat_until(const std::function<void()>& publish, const std::function<bool()>& heard) {
+  const auto deadline = std::chrono::steady_clock::now() + testing::kForever;
+  while (!heard() && std::chrono::steady_clock::now() < deadline) {
+    publish();
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+}
+
 /// As a recorder gets them from the middleware.
 template <class T>
 SerializedMessage sent_bytes(const Topic<T>& topic, const T& message) {
@@ -76,11 +87,9 @@ SerializedMessage sent_bytes(const Topic<T>& topic, const T& message) {
       ros_type<T>("/msg/"),
       topic.qos,
       [&](SerializedMessage& cdr, const MessageInfo&) { heard.add(cdr); });
-  testing::Readers readers;
-  Publisher<T> publisher(writer, topic, readers.events());
-  readers.wait_for(1);
-  publisher.publish(message);
-  return heard.wait_for(1) ? heard.items().front() : SerializedMessage{};
+  Publisher<T> publisher(writer, topic);
+  repeat_until([&] { publisher.publish(message); }, [&] { return heard.size() > 0; });
+  return heard.size() > 0 ? heard.items().front() : SerializedMessage{};
 }
 
 /// Sent by a writer of ours, received as a `T` by a reader of ours.
@@ -92,12 +101,9 @@ Json received(const Topic<T>& topic, const SerializedMessage& cdr) {
   testing::Collected<Json> heard;
   const Subscription<T> subscription(
       reader, topic, [&](const T& m, const MessageInfo&) { heard.add(json_of(m)); });
-  testing::Readers readers;
-  SerializedPublisher publisher(
-      writer, std::string(topic.name), ros_type<T>("/msg/"), topic.qos, readers.events());
-  readers.wait_for(1);
-  publisher.publish(cdr);
-  return heard.wait_for(1) ? heard.items().front() : Json{};
+  SerializedPublisher publisher(writer, std::string(topic.name), ros_type<T>("/msg/"), topic.qos);
+  repeat_until([&] { publisher.publish(cdr); }, [&] { return heard.size() > 0; });
+  return heard.size() > 0 ? heard.items().front() : Json{};
 }
 
 class Ros2Cdr : public ::testing::TestWithParam<const char*> {
