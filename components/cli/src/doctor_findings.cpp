@@ -39,10 +39,12 @@ std::string ros_type_of(const std::string& dds_type) {
   return dds_type.substr(0, at) + "/msg/" + dds_type.substr(name, dds_type.size() - name - 1);
 }
 
-std::string program_or_writer(const DiscoveredEndpoint& endpoint) {
-  return endpoint.process && !program_of(*endpoint.process).empty()
-             ? program_of(*endpoint.process) + " (process " + std::to_string(*endpoint.process) +
-                   ")"
+/// A number tells a process on this computer only, and another's may have the same: so only a
+/// program of ours is named.
+std::string owner_of(const DiscoveredEndpoint& endpoint) {
+  const std::string program = endpoint.process ? program_of(*endpoint.process) : "";
+  return program.starts_with("trigpoint")
+             ? program + " (process " + std::to_string(*endpoint.process) + ")"
              : "participant " + endpoint.guid.substr(0, 24);
 }
 
@@ -115,11 +117,11 @@ std::vector<Finding> wrong_types(const std::vector<TopicSurvey>& surveys,
       const std::string type = ros_type_of(endpoint.dds_type);
       if (!endpoint.dds_topic.starts_with(kRosPrefix)) {
         found.push_back({survey.topic.name,
-                         program_or_writer(endpoint) + " writes it under the DDS name '" +
+                         owner_of(endpoint) + " writes it under the DDS name '" +
                              endpoint.dds_topic + "': ROS 2's name is 'rt/" + name + "'"});
       } else if (type != survey.topic.ros_type) {
         found.push_back({survey.topic.name,
-                         program_or_writer(endpoint) + " writes it as " + type + ", " +
+                         owner_of(endpoint) + " writes it as " + type + ", " +
                              survey.topic.ros_type +
                              " is expected: they never match; give that topic another name"});
       }
@@ -165,8 +167,8 @@ std::vector<Finding> readers_in_vain(const std::vector<DiscoveredEndpoint>& endp
       const std::string missing = missing_policy(writer, reader);
       if (!missing.empty()) {
         found.push_back({without_prefix(writer.dds_topic),
-                         program_or_writer(reader) + " hears nothing of " +
-                             program_or_writer(writer) + ": it asks for " + missing});
+                         owner_of(reader) + " hears nothing of " + owner_of(writer) +
+                             ": it asks for " + missing});
       }
     }
   }
@@ -211,9 +213,8 @@ std::vector<Finding> swapped_positions(const std::vector<TopicSurvey>& surveys) 
     if (as_it_is_m > kSameSite_m) {
       found.push_back({survey.topic.name,
                        number(as_it_is_m / 1e3) + " km from the datum" +
-                           (exchanged_m < kSameSite_m
-                                ? ": latitude and longitude are swapped"
-                                : ": is the datum that of another site (fusion_gate.datum)?")});
+                           (exchanged_m < kSameSite_m ? ": latitude and longitude are swapped"
+                                                      : ": is the datum that of another site?")});
     }
   }
   return found;
@@ -272,7 +273,7 @@ std::vector<std::string> who_is_there(const std::vector<DiscoveredEndpoint>& end
   std::map<std::string, Party> parties;  // by participant
   for (const DiscoveredEndpoint& endpoint : endpoints) {
     Party& party = parties[endpoint.guid.substr(0, 24)];
-    party.name = program_or_writer(endpoint) + ", " + vendor_of(endpoint.guid);
+    party.name = owner_of(endpoint) + ", " + vendor_of(endpoint.guid);
     (endpoint.writes ? party.writes : party.reads).insert(without_prefix(endpoint.dds_topic));
   }
   std::vector<std::string> lines;

@@ -37,9 +37,9 @@ struct SurveyOptions {
   bus::Config bus;
   std::vector<KnownTopic> topics;
   double duration_s{5.0};
-  std::function<void(const Event&)> on_event;  ///< may be empty
+  std::function<void(const Event&)> on_event{};  ///< may be empty
   /// May be empty; told before leaving: everybody's writers and readers, on all topics.
-  std::function<void(std::vector<bus::DiscoveredEndpoint>)> on_discovered;
+  std::function<void(std::vector<bus::DiscoveredEndpoint>)> on_discovered{};
 };
 
 /// Joins the bus, listens, leaves. Ends early on SIGINT or SIGTERM. Throws std::runtime_error when
