@@ -123,8 +123,11 @@ std::vector<DiscoveredEndpoint> FastNode::discovered() {
   std::vector<DiscoveredEndpoint> all;
   {
     const std::lock_guard lock(discovery_mutex_);
+    const std::string own = participant_of(guid_text(participant_->guid()));
     for (const auto& [guid, endpoint] : endpoints_) {
-      all.push_back(endpoint);
+      if (!guid.starts_with(own)) {  // Fast DDS tells of our own too
+        all.push_back(endpoint);
+      }
     }
   }
   for (DiscoveredEndpoint& endpoint : all) {
