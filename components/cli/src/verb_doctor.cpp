@@ -85,7 +85,7 @@ int examine_bus(const DoctorOptions& options) {
   for (const Finding& finding : findings_of(surveys, endpoints, config.cores.robot)) {
     wrong |= tell(finding.topic, {finding.sentence});
   }
-  std::cout << "on the bus:\n";
+  std::cout << (endpoints.empty() ? "on the bus: nobody else\n" : "on the bus:\n");
   for (const std::string& line : who_is_there(endpoints)) {
     std::cout << "  " << line << "\n";
   }
