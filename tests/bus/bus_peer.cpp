@@ -4,17 +4,25 @@
 //   bus_peer DOMAIN TOPIC            its example, again and again until it is killed
 //   bus_peer DOMAIN hear TOPIC       hears it until it is killed, and is missed only long after
 //   bus_peer DOMAIN stream BYTES     IMU at 400 Hz beside clouds of so many bytes at 10 Hz
+//   bus_peer DOMAIN everything       a writer of every topic, each sending its example
+//   bus_peer DOMAIN nothing          a reader of every topic
 // BUS_PEER_SECURITY in the environment names the folder of its credentials.
 #include "bus_fixture.hpp"
 #include "matrix_messages.hpp"
 #include <sys/prctl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <functional>
+#include <memory>
 #include <optional>
+#include <set>
+#include <string_view>
 #include <thread>
+#include <vector>
 
 namespace trigpoint::bus::matrix {
 namespace {
@@ -50,6 +58,41 @@ int hear(Participant& participant, const std::string& wanted) {
     }
   });
   std::fprintf(stderr, "bus_peer: no topic %s\n", wanted.c_str());
+  return 1;
+}
+
+/// Of two topics with the same name the first: a participant takes a name with one type only.
+template <class Visitor>
+void visit_names(Visitor&& visit) {
+  std::set<std::string_view> names;
+  visit_topics([&]<class T>(const char*, const Topic<T>& topic, const T& example) {
+    if (names.insert(topic.name).second) {
+      visit(topic, example);
+    }
+  });
+}
+
+int write_everything(Participant& participant) {
+  std::vector<std::function<bool()>> writers;
+  visit_names([&]<class T>(const Topic<T>& topic, const T& example) {
+    writers.push_back([publisher = std::make_shared<Publisher<T>>(participant, topic), example] {
+      return publisher->publish(example);
+    });
+  });
+  while (std::all_of(writers.begin(), writers.end(), [](const auto& write) { return write(); })) {
+    sleep_for(kAgain);
+  }
+  std::fprintf(stderr, "bus_peer: cannot publish\n");
+  return 1;
+}
+
+int hear_everything(Participant& participant) {
+  std::vector<std::shared_ptr<void>> readers;
+  visit_names([&]<class T>(const Topic<T>& topic, const T&) {
+    readers.push_back(
+        std::make_shared<Subscription<T>>(participant, topic, [](const T&, const MessageInfo&) {}));
+  });
+  pause();
   return 1;
 }
 
@@ -100,7 +143,8 @@ int main(int count, char** arguments) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);  // never outlives a test that fails
   if (count < 3) {
     std::fprintf(stderr,
-                 "usage: bus_peer DOMAIN TOPIC | DOMAIN hear TOPIC | DOMAIN stream BYTES\n");
+                 "usage: bus_peer DOMAIN TOPIC | DOMAIN hear TOPIC | DOMAIN stream BYTES | "
+                 "DOMAIN everything | DOMAIN nothing\n");
     return 2;
   }
   const std::string what = arguments[2];
@@ -115,6 +159,10 @@ int main(int count, char** arguments) {
   Participant participant(config, "bus_peer");
   if (count > 3 && what == "hear") {
     return matrix::hear(participant, arguments[3]);
+  }
+  if (what == "everything" || what == "nothing") {
+    return what == "nothing" ? matrix::hear_everything(participant)
+                             : matrix::write_everything(participant);
   }
   return count > 3 && what == "stream"
              ? matrix::stream(participant, std::strtoul(arguments[3], nullptr, 10))

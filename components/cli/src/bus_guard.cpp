@@ -3,18 +3,15 @@
 #include "bus_guard.hpp"
 
 #include "known_topics.hpp"
+#include "program_name.hpp"
 
 #include <chrono>
-#include <filesystem>
-#include <fstream>
 #include <set>
 #include <stdexcept>
 
 namespace trigpoint::cli {
 
 namespace {
-
-namespace fs = std::filesystem;
 
 // Processes on one computer find each other within about 0.2 s; the rest is for a loaded one.
 constexpr double kListen_s = 1.5;
@@ -31,14 +28,6 @@ std::vector<recording::KnownTopic> guarded_topics(const RobotConfig& robot, Guar
     throw std::logic_error("a guarded topic is not among the known ones");
   }
   return guards;
-}
-
-/// The name of the program that process `number` runs; empty when there is none to be read.
-std::string program_of(unsigned number) {
-  std::ifstream file("/proc/" + std::to_string(number) + "/cmdline", std::ios::binary);
-  std::string program;
-  std::getline(file, program, '\0');
-  return fs::path(program).filename().string();
 }
 
 std::vector<recording::TopicSurvey> listen(const SystemConfig& config, Guarded guarded) {

@@ -3,6 +3,7 @@
 #include "trigpoint/shell/shell.hpp"
 
 #include "bus_survey.hpp"
+#include "doctor_findings.hpp"
 #include "gps_filter_check.hpp"
 #include "input.hpp"
 #include "measurement_checks.hpp"
@@ -37,13 +38,20 @@ int tell(const std::string& topic, const std::vector<std::string>& remarks) {
   return remarks.empty() ? 0 : 1;
 }
 
+std::string refused_advice(const std::string& policy) {
+  return "a writer offers less than we ask for (" + policy + ")" +
+         (policy == "RELIABILITY" ? ": read as best effort; set it to reliable where clouds or IMU "
+                                    "samples get lost"
+          : policy == "DURABILITY" ? ": set it to transient local"
+                                   : ": remove that policy from the writer");
+}
+
 void tell_socket_buffer_limit() {
   std::ifstream file("/proc/sys/net/core/rmem_max");
   std::int64_t limit = 0;
-  if (file >> limit && limit < kWantedSocketBuffer_bytes) {
-    std::cout << "  ! socket buffers are limited to " << limit
-              << " bytes: clouds will be paced and repaired; better: sysctl -w net.core.rmem_max="
-              << kWantedSocketBuffer_bytes << "\n";
+  if (file >> limit) {
+    const std::string advice = buffer_advice(limit, kWantedSocketBuffer_bytes);
+    std::cout << (advice.empty() ? "" : "  ! " + advice + "\n");
   }
 }
 
@@ -52,10 +60,13 @@ int examine_bus(const DoctorOptions& options) {
   const SystemConfig config = load_config_of(options.input);
   std::cout << "DDS domain " << bus::domain_of(config.bus) << ", listening for " << options.seconds
             << " s\n";
-  const auto surveys = recording::survey_bus({config.bus,
-                                              recording::known_topics(config.cores.robot),
-                                              options.seconds,
-                                              [&log](const Event& event) { log(event); }});
+  std::vector<bus::DiscoveredEndpoint> endpoints;
+  const auto surveys = recording::survey_bus(
+      {config.bus,
+       recording::known_topics(config.cores.robot),
+       options.seconds,
+       [&log](const Event& event) { log(event); },
+       [&endpoints](std::vector<bus::DiscoveredEndpoint> found) { endpoints = std::move(found); }});
   int wrong = 0;
   bool anybody = false;
   for (const recording::TopicSurvey& survey : surveys) {
@@ -68,8 +79,15 @@ int examine_bus(const DoctorOptions& options) {
               << survey.rate_hz << " Hz\n";
     wrong |= tell(survey.topic.name, survey.remarks);
     for (const std::string& policy : survey.refused) {
-      wrong |= tell(survey.topic.name, {"a writer offers less than we ask for (" + policy + ")"});
+      wrong |= tell(survey.topic.name, {refused_advice(policy)});
     }
+  }
+  for (const Finding& finding : findings_of(surveys, endpoints, config.cores.robot)) {
+    wrong |= tell(finding.topic, {finding.sentence});
+  }
+  std::cout << (endpoints.empty() ? "on the bus: nobody else\n" : "on the bus:\n");
+  for (const std::string& line : who_is_there(endpoints)) {
+    std::cout << "  " << line << "\n";
   }
   tell_socket_buffer_limit();
   if (!anybody) {

@@ -62,7 +62,8 @@ class Listener {
     ++survey_.messages;
     survey_.bytes += bytes.size();
     survey_.writers.insert(writer);
-    check<ImuSample>(bytes) || check<GnssFix>(bytes) || check<PointCloudMessage>(bytes);
+    check<ImuSample>(bytes) || check<GnssFix>(bytes) || check<PointCloudMessage>(bytes) ||
+        check<Odometry>(bytes);
   }
 
   template <typename Plain>
@@ -73,11 +74,31 @@ class Listener {
     Plain value;
     if (bus::decode_cdr(bytes, value)) {
       checks_.take(value);
+      remember(value);
     } else {
       checks_.note("a message could not be decoded as " + survey_.topic.ros_type);
     }
     return true;
   }
+
+  void remember(const GnssFix& fix) { survey_.last_fix = fix; }
+
+  void remember(const Odometry& odometry) {
+    const std::string& topic = survey_.topic.name;
+    if (topic == "gps/odometry" && odometry.pose_covariance.isZero(0.0)) {
+      checks_.note(
+          "the pose has a covariance of 0, as if it were perfect: what is not known is 1e6");
+    }
+    const std::string frame = topic.starts_with("lio/")      ? "odom"
+                              : topic.starts_with("fusion/") ? "map"
+                                                             : odometry.frame_id;
+    if (odometry.frame_id != frame) {
+      checks_.note("frame_id is '" + odometry.frame_id + "', expected is '" + frame + "'");
+    }
+  }
+
+  template <typename Plain>
+  void remember(const Plain&) {}
 
   TopicSurvey survey_;
   std::set<std::string> matched_;
@@ -96,6 +117,9 @@ std::vector<TopicSurvey> survey_bus(const SurveyOptions& options) {
   }
   loop.every(std::chrono::nanoseconds(from_seconds(options.duration_s)), [&loop] { loop.stop(); });
   loop.run();
+  if (options.on_discovered) {
+    options.on_discovered(participant.discovered());
+  }
   std::vector<TopicSurvey> surveys;
   for (const auto& listener : listeners) {
     surveys.push_back(listener->result(participant, options.duration_s));

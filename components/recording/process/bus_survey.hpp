@@ -4,13 +4,16 @@
 #pragma once
 
 #include "trigpoint/base/event.hpp"
+#include "trigpoint/base/measurements.hpp"
 #include "trigpoint/bus/config.hpp"
+#include "trigpoint/bus/discovered.hpp"
 
 #include "known_topics.hpp"
 
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -27,13 +30,16 @@ struct TopicSurvey {
   std::map<std::string, unsigned> processes;  ///< numbers of the writers' processes, where told
   std::set<std::string> refused;              ///< QoS policies for which a writer did not match
   std::vector<std::string> remarks;           ///< wrong units, missing fields, frames: sentences
+  std::optional<GnssFix> last_fix;            ///< or datum
 };
 
 struct SurveyOptions {
   bus::Config bus;
   std::vector<KnownTopic> topics;
   double duration_s{5.0};
-  std::function<void(const Event&)> on_event;  ///< may be empty
+  std::function<void(const Event&)> on_event{};  ///< may be empty
+  /// May be empty; told before leaving: everybody's writers and readers, on all topics.
+  std::function<void(std::vector<bus::DiscoveredEndpoint>)> on_discovered{};
 };
 
 /// Joins the bus, listens, leaves. Ends early on SIGINT or SIGTERM. Throws std::runtime_error when

@@ -22,6 +22,12 @@ std::string number(double value) {
   return text.data();
 }
 
+/// Neither is possible as it is, and both are the other way round.
+bool are_swapped(const GnssFix& fix) {
+  return std::abs(fix.latitude_deg) > 90.0 && std::abs(fix.latitude_deg) <= 180.0 &&
+         std::abs(fix.longitude_deg) <= 90.0;
+}
+
 bool has_field(const PointCloudMessage& cloud, const std::vector<std::string>& names) {
   return std::any_of(cloud.fields.begin(), cloud.fields.end(), [&names](const PointField& field) {
     return std::find(names.begin(), names.end(), field.name) != names.end();
@@ -54,7 +60,8 @@ void MeasurementChecks::take(const GnssFix& fix) {
       !std::isfinite(fix.altitude_m)) {
     note("a position that is not finite (NaN or infinite): the fix is of no use");
   } else if (std::abs(fix.latitude_deg) > 90.0 || std::abs(fix.longitude_deg) > 180.0) {
-    note("latitude or longitude out of range (90 and 180 degrees)");
+    note(are_swapped(fix) ? "latitude and longitude are swapped: a latitude is within 90 degrees"
+                          : "latitude or longitude out of range (90 and 180 degrees)");
   }
   if (origin_ == Origin::kOurs) {
     return;
@@ -78,6 +85,20 @@ void MeasurementChecks::take(const PointCloudMessage& cloud) {
     note(
         "the points carry no time (no field time, t or timestamp): set lio_mapper.sweep.point_time "
         "to azimuth or snapshot");
+  }
+}
+
+void MeasurementChecks::take(const Odometry& odometry) {
+  constexpr double kUnitLengthTolerance = 1e-3;
+  check_stamp(odometry.stamp_ns, odometry.frame_id);
+  if (odometry.child_frame_id.empty()) {
+    note("an empty child_frame_id: base_link is expected, or gnss_antenna");
+  }
+  const auto& T_frame_child = odometry.T_frame_child;
+  if (!T_frame_child.p.allFinite() || !T_frame_child.q.coeffs().allFinite()) {
+    note("a pose that is not finite (NaN or infinite)");
+  } else if (std::abs(T_frame_child.q.norm() - 1.0) > kUnitLengthTolerance) {
+    note("an orientation that is no unit quaternion");
   }
 }
 
@@ -122,6 +143,9 @@ void MeasurementChecks::check_stamp(Nanoseconds stamp_ns, const std::string& fra
   newest_ns_ = std::max(newest_ns_, stamp_ns);
   if (frame_id.empty()) {
     note("an empty frame_id");
+  } else if (frame_id.front() == '/') {
+    note("frame_id '" + frame_id +
+         "' begins with a slash, as in ROS 1: tf2 of ROS 2 finds no such frame");
   }
 }
 

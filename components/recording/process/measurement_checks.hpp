@@ -3,6 +3,7 @@
 #pragma once
 
 #include "trigpoint/base/measurements.hpp"
+#include "trigpoint/base/messages.hpp"
 
 #include <cstdint>
 #include <map>
@@ -24,6 +25,7 @@ class MeasurementChecks {
   void take(const ImuSample& sample);
   void take(const GnssFix& fix);
   void take(const PointCloudMessage& cloud);
+  void take(const Odometry& odometry);
   void note(const std::string& sentence);
 
   /// Sentences with the numbers and what to do, each with how often it was seen.

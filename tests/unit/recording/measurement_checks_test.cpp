@@ -42,6 +42,38 @@ TEST(MeasurementChecks, counts_fixes_whose_position_or_covariance_is_not_finite)
   EXPECT_THAT(checks.remarks(), Contains(HasSubstr("a covariance that is not finite")));
 }
 
+TEST(MeasurementChecks, tells_swapped_coordinates_from_those_out_of_range) {
+  MeasurementChecks swapped;
+  GnssFix fix = sample_fix(0);
+  fix.latitude_deg = 139.7;
+  fix.longitude_deg = 35.7;
+  swapped.take(fix);
+  EXPECT_THAT(swapped.remarks(), testing::ElementsAre(HasSubstr("are swapped")));
+  MeasurementChecks out_of_range;
+  fix.longitude_deg = 139.7;
+  out_of_range.take(fix);
+  EXPECT_THAT(out_of_range.remarks(), testing::ElementsAre(HasSubstr("out of range")));
+}
+
+TEST(MeasurementChecks, tell_an_odometry_without_child_frame_or_with_a_broken_pose) {
+  Odometry odometry;
+  odometry.stamp_ns = 1;
+  odometry.frame_id = "odom";
+  odometry.child_frame_id = "base_link";
+  MeasurementChecks good;
+  good.take(odometry);
+  EXPECT_THAT(good.remarks(), IsEmpty());
+  odometry.frame_id = "/odom";
+  odometry.child_frame_id.clear();
+  odometry.T_frame_child.q.coeffs().setZero();
+  MeasurementChecks bad;
+  bad.take(odometry);
+  EXPECT_THAT(bad.remarks(),
+              testing::UnorderedElementsAre(HasSubstr("begins with a slash"),
+                                            HasSubstr("an empty child_frame_id"),
+                                            HasSubstr("no unit quaternion")));
+}
+
 TEST(MeasurementChecks, does_not_ask_of_our_own_topics_what_only_sensors_have) {
   PointCloudMessage map = sample_cloud(0);
   map.fields.pop_back();

@@ -54,6 +54,44 @@ dds_entity_t create_domain(const Config& config, const std::string& xml, dds_dom
   return dds_create_domain(id, xml.c_str());
 }
 
+DiscoveredEndpoint endpoint_of(const dds_builtintopic_endpoint_t& told, bool writes) {
+  DiscoveredEndpoint endpoint{guid_text(told.key), writes, told.topic_name, told.type_name};
+  dds_reliability_kind_t reliability{};
+  dds_durability_kind_t durability{};
+  if (dds_qget_reliability(told.qos, &reliability, nullptr)) {
+    endpoint.reliability =
+        reliability == DDS_RELIABILITY_RELIABLE ? Reliability::kReliable : Reliability::kBestEffort;
+  }
+  if (dds_qget_durability(told.qos, &durability)) {
+    endpoint.durability =
+        durability == DDS_DURABILITY_VOLATILE ? Durability::kVolatile : Durability::kTransientLocal;
+  }
+  return endpoint;
+}
+
+/// Cyclone has a topic for all writers and one for all readers that it knows.
+template <class Visitor>
+void read_endpoints(dds_entity_t participant, bool writers, Visitor&& visit) {
+  constexpr std::uint32_t kMost = 4096;
+  const dds_entity_t reader = dds_create_reader(
+      participant,
+      writers ? DDS_BUILTIN_TOPIC_DCPSPUBLICATION : DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION,
+      nullptr,
+      nullptr);
+  std::vector<void*> samples(kMost, nullptr);
+  std::vector<dds_sample_info_t> infos(kMost);
+  const dds_return_t count = dds_read(reader, samples.data(), infos.data(), kMost, kMost);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(std::max(count, 0)); ++i) {
+    if (infos[i].valid_data && infos[i].instance_state == DDS_IST_ALIVE) {
+      visit(*static_cast<const dds_builtintopic_endpoint_t*>(samples[i]));
+    }
+  }
+  if (count > 0) {
+    dds_return_loan(reader, samples.data(), count);
+  }
+  dds_delete(reader);
+}
+
 }  // namespace
 
 CycloneNode::CycloneNode(const Config& config, const std::string& name, EventSink sink)
@@ -85,6 +123,23 @@ CycloneNode::CycloneNode(const Config& config, const std::string& name, EventSin
 
 CycloneNode::~CycloneNode() {
   dds_delete(domain_);
+}
+
+std::vector<DiscoveredEndpoint> CycloneNode::discovered() {
+  dds_guid_t own{};
+  dds_get_guid(participant_, &own);
+  std::vector<DiscoveredEndpoint> all;
+  for (const bool writes : {true, false}) {
+    read_endpoints(participant_, writes, [&](const dds_builtintopic_endpoint_t& told) {
+      if (guid_text(told.participant_key) != guid_text(own)) {
+        all.push_back(endpoint_of(told, writes));
+      }
+    });
+  }
+  for (DiscoveredEndpoint& endpoint : all) {
+    endpoint.process = process_of(endpoint.guid);
+  }
+  return all;
 }
 
 /// Cyclone keeps what participants say of themselves for whoever reads this topic.

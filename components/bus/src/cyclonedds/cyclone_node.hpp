@@ -34,6 +34,7 @@ class CycloneNode : public backend::Node {
                                                SubscriptionEvents events) override;
 
   std::optional<unsigned> process_of(const std::string& writer_guid) override;
+  std::vector<DiscoveredEndpoint> discovered() override;
 
   dds_entity_t participant() const { return participant_; }
 

@@ -71,19 +71,69 @@ void FastNode::on_participant_discovery(dds::DomainParticipant*,
                                         eprosima::fastrtps::rtps::ParticipantDiscoveryInfo&& info) {
   using Info = eprosima::fastrtps::rtps::ParticipantDiscoveryInfo;
   const std::string guid = participant_of(guid_text(info.info.m_guid));
-  const std::lock_guard lock(processes_mutex_);
+  const std::lock_guard lock(discovery_mutex_);
   if (info.status == Info::REMOVED_PARTICIPANT || info.status == Info::DROPPED_PARTICIPANT) {
     processes_.erase(guid);
+    std::erase_if(endpoints_, [&guid](const auto& each) { return each.first.starts_with(guid); });
   } else if (const auto number = noted_process(info.info.m_userData)) {
     processes_[guid] = *number;
   }
 }
 
 std::optional<unsigned> FastNode::process_of(const std::string& writer_guid) {
-  const std::lock_guard lock(processes_mutex_);
+  const std::lock_guard lock(discovery_mutex_);
   const auto noted = processes_.find(participant_of(writer_guid));
   return noted != processes_.end() ? std::optional(noted->second)
                                    : process_in_fastdds_guid(writer_guid);
+}
+
+template <class Data>
+void FastNode::note_endpoint(bool writes, const Data& data, bool removed) {
+  const std::string guid = guid_text(data.guid());
+  const std::lock_guard lock(discovery_mutex_);
+  if (removed) {
+    endpoints_.erase(guid);
+    return;
+  }
+  DiscoveredEndpoint endpoint{guid, writes, data.topicName().c_str(), data.typeName().c_str()};
+  endpoint.reliability = data.m_qos.m_reliability.kind == dds::RELIABLE_RELIABILITY_QOS
+                             ? Reliability::kReliable
+                             : Reliability::kBestEffort;
+  endpoint.durability = data.m_qos.m_durability.kind == dds::VOLATILE_DURABILITY_QOS
+                            ? Durability::kVolatile
+                            : Durability::kTransientLocal;
+  endpoints_.insert_or_assign(guid, endpoint);
+}
+
+void FastNode::on_publisher_discovery(dds::DomainParticipant*,
+                                      eprosima::fastrtps::rtps::WriterDiscoveryInfo&& info) {
+  note_endpoint(true,
+                info.info,
+                info.status == eprosima::fastrtps::rtps::WriterDiscoveryInfo::REMOVED_WRITER);
+}
+
+void FastNode::on_subscriber_discovery(dds::DomainParticipant*,
+                                       eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) {
+  note_endpoint(false,
+                info.info,
+                info.status == eprosima::fastrtps::rtps::ReaderDiscoveryInfo::REMOVED_READER);
+}
+
+std::vector<DiscoveredEndpoint> FastNode::discovered() {
+  std::vector<DiscoveredEndpoint> all;
+  {
+    const std::lock_guard lock(discovery_mutex_);
+    const std::string own = participant_of(guid_text(participant_->guid()));
+    for (const auto& [guid, endpoint] : endpoints_) {
+      if (!guid.starts_with(own)) {  // Fast DDS tells of our own too
+        all.push_back(endpoint);
+      }
+    }
+  }
+  for (DiscoveredEndpoint& endpoint : all) {
+    endpoint.process = process_of(endpoint.guid);
+  }
+  return all;
 }
 
 void FastNode::tell(const Event& event) const {

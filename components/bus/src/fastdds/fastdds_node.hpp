@@ -30,6 +30,7 @@ class FastNode : public backend::Node, private eprosima::fastdds::dds::DomainPar
                                                backend::Deliver deliver,
                                                SubscriptionEvents events) override;
   std::optional<unsigned> process_of(const std::string& writer_guid) override;
+  std::vector<DiscoveredEndpoint> discovered() override;
 
   eprosima::fastdds::dds::Publisher& publisher() { return *publisher_; }
 
@@ -47,13 +48,22 @@ class FastNode : public backend::Node, private eprosima::fastdds::dds::DomainPar
   void on_participant_discovery(eprosima::fastdds::dds::DomainParticipant* participant,
                                 eprosima::fastrtps::rtps::ParticipantDiscoveryInfo&& info) override;
 
+  void on_publisher_discovery(eprosima::fastdds::dds::DomainParticipant* participant,
+                              eprosima::fastrtps::rtps::WriterDiscoveryInfo&& info) override;
+  void on_subscriber_discovery(eprosima::fastdds::dds::DomainParticipant* participant,
+                               eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) override;
+  /// `Data` is what Fast DDS knows of a remote writer or reader.
+  template <class Data>
+  void note_endpoint(bool writes, const Data& data, bool removed);
+
   eprosima::fastdds::dds::Topic* topic(const std::string& dds_type, const std::string& dds_topic);
 
   const Config config_;
   const EventSink sink_;
   bool is_paced_{false};
-  std::mutex processes_mutex_;
-  std::map<std::string, unsigned> processes_;  ///< by the participant's part of a GUID
+  std::mutex discovery_mutex_;
+  std::map<std::string, unsigned> processes_;            ///< by the participant's part of a GUID
+  std::map<std::string, DiscoveredEndpoint> endpoints_;  ///< by GUID
   std::mutex topics_mutex_;
   eprosima::fastdds::dds::DomainParticipant* participant_{nullptr};
   eprosima::fastdds::dds::Publisher* publisher_{nullptr};

@@ -4,6 +4,7 @@
 
 #include "../message_info.hpp"
 #include "../reader_events.hpp"
+#include <unistd.h>
 
 #include <algorithm>
 #include <utility>
@@ -105,7 +106,8 @@ LocalReader::LocalReader(int domain,
       deliver_(std::move(deliver)),
       events_(std::move(events)),
       sink_(std::move(sink)),
-      message_(type.make()) {
+      message_(type.make()),
+      guid_(next_guid()) {
   thread_ = std::thread([this] { work(); });
   Hub::instance().add(*this);
 }
@@ -301,6 +303,30 @@ void Hub::publish(LocalWriter& writer, std::shared_ptr<const Bytes> bytes) {
       send(writer, *reader, sample);
     }
   }
+}
+
+std::vector<DiscoveredEndpoint> Hub::others(int domain, const void* participant) {
+  const std::lock_guard lock(mutex_);
+  std::vector<DiscoveredEndpoint> found;
+  const auto add = [&](bool writes, const auto& one) {
+    const Endpoint& endpoint = one.endpoint_;
+    if (one.domain_ == domain && endpoint.participant != participant) {
+      found.push_back({one.guid_,
+                       writes,
+                       endpoint.dds_topic,
+                       endpoint.dds_type,
+                       endpoint.qos.reliability,
+                       endpoint.qos.durability,
+                       static_cast<unsigned>(getpid())});
+    }
+  };
+  for (const LocalWriter* writer : writers_) {
+    add(true, *writer);
+  }
+  for (const LocalReader* reader : readers_) {
+    add(false, *reader);
+  }
+  return found;
 }
 
 }  // namespace trigpoint::bus::in_process

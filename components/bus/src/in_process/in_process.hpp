@@ -56,6 +56,7 @@ struct Endpoint {
   std::string dds_type;
   std::string dds_topic;
   Qos qos;
+  const void* participant;  ///< tells apart whose it is
 };
 
 class LocalWriter : public backend::Writer {
@@ -129,6 +130,7 @@ class LocalReader : public backend::Reader {
   const SubscriptionEvents events_;
   const EventSink sink_;
   const std::shared_ptr<void> message_;
+  const std::string guid_;
   std::set<std::string> writers_;  ///< guarded by the hub
   std::atomic<int> matched_{0};
   std::atomic<std::uint64_t> malformed_{0};
@@ -151,6 +153,7 @@ class Hub {
   void add(LocalReader& reader);
   void remove(LocalReader& reader);
   void publish(LocalWriter& writer, std::shared_ptr<const Bytes> bytes);
+  std::vector<DiscoveredEndpoint> others(int domain, const void* participant);
 
  private:
   static bool same_topic(const LocalWriter& writer, const LocalReader& reader);

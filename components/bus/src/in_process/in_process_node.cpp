@@ -18,7 +18,10 @@ class LocalNode : public backend::Node {
                                                const Qos& qos,
                                                PublisherEvents events) override {
     return std::make_unique<in_process::LocalWriter>(
-        domain_, type, in_process::Endpoint{type.dds_name, dds_topic, qos}, std::move(events));
+        domain_,
+        type,
+        in_process::Endpoint{type.dds_name, dds_topic, qos, this},
+        std::move(events));
   }
 
   std::unique_ptr<backend::Reader> make_reader(const backend::TypeOps& type,
@@ -29,7 +32,7 @@ class LocalNode : public backend::Node {
     return std::make_unique<in_process::LocalReader>(
         domain_,
         type,
-        in_process::Endpoint{type.dds_name, dds_topic, qos},
+        in_process::Endpoint{type.dds_name, dds_topic, qos, this},
         std::move(deliver),
         std::move(events),
         sink_);
@@ -37,6 +40,10 @@ class LocalNode : public backend::Node {
 
   std::optional<unsigned> process_of(const std::string&) override {
     return static_cast<unsigned>(getpid());
+  }
+
+  std::vector<DiscoveredEndpoint> discovered() override {
+    return in_process::Hub::instance().others(domain_, this);
   }
 
  private:

@@ -6,6 +6,7 @@
 #include "trigpoint/base/event.hpp"
 #include "trigpoint/base/time.hpp"
 #include "trigpoint/bus/config.hpp"
+#include "trigpoint/bus/discovered.hpp"
 #include "trigpoint/bus/qos.hpp"
 
 #include <chrono>
@@ -15,6 +16,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 namespace trigpoint::bus {
 
@@ -83,6 +85,8 @@ class Node {
                                               SubscriptionEvents events) = 0;
   /// Of a matched writer, where that can be told; nobody says on which computer.
   virtual std::optional<unsigned> process_of(const std::string& writer_guid) = 0;
+  /// Everybody else's endpoints on the domain that are known by now.
+  virtual std::vector<DiscoveredEndpoint> discovered() = 0;
 };
 
 /// Defined by the backend that is linked. Throws std::runtime_error with cause and remedy.

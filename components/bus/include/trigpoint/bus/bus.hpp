@@ -37,6 +37,9 @@ class Participant {
     return node_->process_of(writer_guid);
   }
 
+  /// Writers and readers of others, also on topics that nobody here uses.
+  std::vector<DiscoveredEndpoint> discovered() { return node_->discovered(); }
+
  private:
   std::unique_ptr<backend::Node> node_;
 };

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// `trigpoint doctor` on a live bus on which much is wrong, and on one on which nothing is.
+#include "trigpoint/bus/bus.hpp"
+#include "trigpoint/bus/convert.hpp"
+#include "trigpoint/bus/topics.hpp"
+
+#include "bus_fixture.hpp"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <thread>
+
+namespace trigpoint::bus {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// Publishes at 100 Hz on a thread of its own until it is destroyed.
+class Publishing {
+ public:
+  explicit Publishing(std::function<void(Nanoseconds)> publish)
+      : thread_([this, publish = std::move(publish)] {
+          for (Nanoseconds now_ns = 1'700'000'000'000'000'000; !ended_; now_ns += 10'000'000) {
+            publish(now_ns);
+            std::this_thread::sleep_for(10ms);
+          }
+        }) {}
+
+  ~Publishing() {
+    ended_ = true;
+    thread_.join();
+  }
+
+  Publishing(const Publishing&) = delete;
+  Publishing& operator=(const Publishing&) = delete;
+
+ private:
+  std::atomic<bool> ended_{false};
+  std::thread thread_;
+};
+
+tests::CommandResult doctor(const Config& config) {
+  return tests::run_command(
+      {std::string(TRIGPOINT_BIN_DIR) + "/trigpoint", "doctor", "--seconds", "3"},
+      60s,
+      {{"ROS_DOMAIN_ID", std::to_string(config.domain_id)}});
+}
+
+ImuSample imu_at_rest(Nanoseconds now_ns, double gravity, double turning) {
+  ImuSample imu;
+  imu.stamp_ns = now_ns;
+  imu.frame_id = "imu_link";
+  imu.accel_mps2 = {0.0, 0.0, gravity};
+  imu.gyro_radps = {0.0, 0.0, turning};
+  return imu;
+}
+
+GnssFix fix_at(Nanoseconds now_ns, double latitude_deg, double longitude_deg) {
+  GnssFix fix;
+  fix.stamp_ns = now_ns;
+  fix.frame_id = "gps";
+  fix.status = FixStatus::kFix;
+  fix.latitude_deg = latitude_deg;
+  fix.longitude_deg = longitude_deg;
+  fix.altitude_m = 300.0;
+  fix.covariance_enu_m2.setIdentity();
+  fix.covariance_type = CovarianceType::kKnown;
+  return fix;
+}
+
+TEST(Doctor, names_what_is_wrong_on_a_live_bus_and_says_what_to_do) {
+  Config config = testing::own_domain();
+  config.network_interface.clear();
+  Participant others(config, "others");
+  Topic<sensor_msgs::msg::Imu> best_effort = topics::imu;
+  best_effort.qos.reliability = Reliability::kBestEffort;
+  Publisher imu(others, best_effort);
+  Publisher fixes(others, topics::fix);
+  Publisher datum(others, topics::datum);
+  const Publisher clouds(others, topics::points.renamed("velodyne_points"));
+  const Publisher wrong_type(others, Topic<nav_msgs::msg::Odometry>{"fusion/status"});
+  Publisher odometry(others, topics::fusion_odometry);
+  Topic<nav_msgs::msg::Odometry> latched = topics::fusion_odometry;
+  latched.qos.durability = Durability::kTransientLocal;
+  const Subscription<nav_msgs::msg::Odometry> in_vain(
+      others, latched, [](const nav_msgs::msg::Odometry&, const MessageInfo&) {});
+  datum.publish(to_message(Datum{48.78, 9.18, 300.0, 1}));
+  const Publishing publishing([&](Nanoseconds now_ns) {
+    imu.publish(to_message(imu_at_rest(now_ns, 1.0, 40.0)));
+    fixes.publish(to_message(fix_at(now_ns, 9.18, 48.78)));
+    Odometry pose;
+    pose.stamp_ns = now_ns;
+    pose.frame_id = "/odom";
+    pose.child_frame_id = "base_link";
+    odometry.publish(to_message(pose));
+  });
+  const auto result = doctor(config);
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(
+      result.output,
+      AllOf(HasSubstr("! imu/data: acceleration has a mean of 1: it is in g"),
+            HasSubstr("! imu/data: angular rate peaks at 40: is it in degrees per second?"),
+            HasSubstr("! imu/data: a writer offers less than we ask for (RELIABILITY)"),
+            HasSubstr("! gps/fix: 5"),
+            HasSubstr("latitude and longitude are swapped"),
+            HasSubstr("! points: nobody writes it, but its type is written on velodyne_points"),
+            HasSubstr("as nav_msgs/msg/Odometry, trigpoint_msgs/msg/FusionStatus is expected")));
+  EXPECT_THAT(result.output,
+              AllOf(HasSubstr("! fusion/odometry: frame_id '/odom' begins with a slash"),
+                    HasSubstr("! fusion/odometry: frame_id is '/odom', expected is 'map'"),
+                    HasSubstr("set the reader to volatile"),
+                    HasSubstr("on the bus:"),
+                    HasSubstr("; writes datum, fusion/odometry, fusion/status, gps/fix, imu/data, "
+                              "velodyne_points; reads fusion/odometry")));
+}
+
+TEST(Doctor, finds_nothing_wrong_where_nothing_is) {
+  Config config = testing::own_domain();
+  config.network_interface.clear();
+  Participant others(config, "others");
+  Publisher imu(others, topics::imu);
+  Publisher fixes(others, topics::fix);
+  Publisher datum(others, topics::datum);
+  datum.publish(to_message(Datum{48.78, 9.18, 300.0, 1}));
+  const Publishing publishing([&](Nanoseconds now_ns) {
+    imu.publish(to_message(imu_at_rest(now_ns, 9.81, 0.5)));
+    fixes.publish(to_message(fix_at(now_ns, 48.78, 9.18)));
+  });
+  const auto result = doctor(config);
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+  EXPECT_THAT(result.output,
+              AllOf(HasSubstr("writes datum, gps/fix, imu/data"),
+                    Not(HasSubstr("! imu")),
+                    Not(HasSubstr("trigpoint (process"))));
+}
+
+}  // namespace
+}  // namespace trigpoint::bus
