@@ -306,7 +306,10 @@ TEST_F(MapperOnTheBus, goes_on_in_the_same_odom_and_session_after_kill_9_in_the_
   EXPECT_GE(after + kFirstSweeps, received);
   EXPECT_EQ(counted(last), last.scans_received);
   EXPECT_GE(last.scans_received + kInFlight, feed_->sweeps());
-  EXPECT_EQ(exporter::read_trajectory(session() + "/lio.tum").size(), last.scans_used);
+  // A pose is written before the checkpoint that counts it: the kill may fall between.
+  const std::size_t written = exporter::read_trajectory(session() + "/lio.tum").size();
+  EXPECT_GE(written, last.scans_used);
+  EXPECT_LE(written, last.scans_used + kInFlight);
 }
 
 /// Keeps others from writing into a store, as a disk that hangs would.
