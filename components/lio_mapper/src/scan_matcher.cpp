@@ -277,24 +277,22 @@ void ScanMatcher::in_blocks(const Visit& visit) {
   });
 }
 
-/// sum w^2 r^2 h h^T with the residuals r after `step`, whose rows and weights are those of `view`.
+/// sum w^2 r^2 h h^T with the residuals r after `step` from where they were linearised.
 template <int Size>
-typename Information<Size>::Matrix ScanMatcher::scatter_at(
+typename Information<Size>::Matrix ScanMatcher::scatter_after(
     const typename Information<Size>::Vector& step,
-    const Viewpoint& view,
-    std::vector<Information<Size>>& sums) {
+    Scratch<Size>& scratch) {
   using Matrix = typename Information<Size>::Matrix;
-  sums.assign(blocks_of(residuals_.size()), {});
+  scratch.sums.assign(blocks_of(residuals_.size()), {});
   in_blocks([&](std::size_t block, std::size_t i) {
     if (found_[i] == Found::kPlane) {
-      Residual& r = residuals_[i];
-      const typename Information<Size>::Vector h = row_of<Size>(r, view);
-      const double part = r.weight * (r.residual_m + h.dot(step));
-      sums[block].information.noalias() += (part * part * h) * h.transpose();
+      const typename Information<Size>::Vector& h = scratch.rows[i];
+      const double part = residuals_[i].weight * (residuals_[i].residual_m + h.dot(step));
+      scratch.sums[block].information.noalias() += (part * part * h) * h.transpose();
     }
   });
   Matrix sum = Matrix::Zero();
-  for (const Information<Size>& part : sums) {
+  for (const Information<Size>& part : scratch.sums) {
     sum += part.information;
   }
   return sum;
@@ -303,18 +301,19 @@ typename Information<Size>::Matrix ScanMatcher::scatter_at(
 template <int Size>
 Information<Size> ScanMatcher::sum_of_all(const Viewpoint& view,
                                           const MapOrigins* origins,
-                                          std::vector<Information<Size>>& sums) {
-  sums.assign(blocks_of(residuals_.size()), {});
+                                          Scratch<Size>& scratch) {
+  scratch.sums.assign(blocks_of(residuals_.size()), {});
+  scratch.rows.resize(residuals_.size());
   in_blocks([&](std::size_t block, std::size_t i) {
     refresh(i, view, origins);
     if (found_[i] == Found::kPlane) {
       Residual& r = residuals_[i];
-      const typename Information<Size>::Vector h = row_of<Size>(r, view);
-      add_row(h, r.weight, r.residual_m, r.plane, sums[block]);
+      scratch.rows[i] = row_of<Size>(r, view);
+      add_row(scratch.rows[i], r.weight, r.residual_m, r.plane, scratch.sums[block]);
     }
   });
   Information<Size> sum;
-  for (const Information<Size>& part : sums) {
+  for (const Information<Size>& part : scratch.sums) {
     sum.information += part.information;
     sum.gradient += part.gradient;
     sum.noise += part.noise;
@@ -329,7 +328,7 @@ Information<Size> ScanMatcher::sum_of_all(const Viewpoint& view,
   const Matrix by = noise_free_share(sum);
   const Eigen::LLT<Matrix> root(sum.information + kLeastInformation * Matrix::Identity());
   const typename Information<Size>::Vector step = -root.solve(sum.gradient);
-  allow_for_scatter(scatter_at(step, view, sums), root, step, sum);
+  allow_for_scatter(scatter_after(step, scratch), root, step, sum);
   const double scale = static_cast<double>(count_patches()) / static_cast<double>(sum.count);
   sum.information = (scale * by * sum.information * by).eval();
   sum.gradient = (scale * by * sum.gradient).eval();
@@ -340,12 +339,12 @@ Information<Size> ScanMatcher::sum_of_all(const Viewpoint& view,
 template <int Size>
 Information<Size> ScanMatcher::linearise_all(const Viewpoint& view,
                                              const MapOrigins* origins,
-                                             std::vector<Information<Size>>& sums) {
-  Information<Size> sum = sum_of_all(view, origins, sums);
+                                             Scratch<Size>& scratch) {
+  Information<Size> sum = sum_of_all(view, origins, scratch);
   if (!std::exchange(judged_, true)) {
     also_nearest_ = leaves_pose_open(sum.information.template topLeftCorner<6, 6>());
     if (also_nearest_) {
-      sum = sum_of_all(view, origins, sums);
+      sum = sum_of_all(view, origins, scratch);
     }
   }
   return sum;
@@ -355,7 +354,7 @@ PoseInformation ScanMatcher::linearise(const Pose& T_odom_base) {
   return linearise_all(
       Viewpoint{T_odom_base, T_odom_base.q.toRotationMatrix(), T_base_lidar_, Pose{}},
       nullptr,
-      sums_);
+      scratch_);
 }
 
 PoseAndExtrinsicInformation ScanMatcher::linearise(const Pose& T_odom_base,
@@ -366,7 +365,7 @@ PoseAndExtrinsicInformation ScanMatcher::linearise(const Pose& T_odom_base,
                                  T_base_lidar,
                                  T_base_lidar * T_base_lidar_.inverse()},
                        &origins,
-                       sums_with_extrinsic_);
+                       scratch_with_extrinsic_);
 }
 
 double ScanMatcher::share_within(double distance_m) const {

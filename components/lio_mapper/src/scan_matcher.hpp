@@ -65,6 +65,13 @@ class ScanMatcher {
     Pose T_base_base;  ///< from the axes of the points to those of the present extrinsic
   };
 
+  /// Of one linearisation.
+  template <int Size>
+  struct Scratch {
+    std::vector<Information<Size>> sums;                   ///< of blocks
+    std::vector<typename Information<Size>::Vector> rows;  ///< of residuals
+  };
+
   using Ask = bool (LocalMap::*)(const Eigen::Vector3d&, PlaneMatch&) const;
 
   enum class Found : std::uint8_t { kNotAsked, kNothing, kMisfit, kPlane };
@@ -78,9 +85,8 @@ class ScanMatcher {
   template <int Size>
   typename Information<Size>::Vector row_of(Residual& residual, const Viewpoint& view) const;
   template <int Size>
-  typename Information<Size>::Matrix scatter_at(const typename Information<Size>::Vector& step,
-                                                const Viewpoint& view,
-                                                std::vector<Information<Size>>& sums);
+  typename Information<Size>::Matrix scatter_after(const typename Information<Size>::Vector& step,
+                                                   Scratch<Size>& scratch);
   void number_patches();
   std::size_t count_patches();
   template <typename Visit>
@@ -88,11 +94,11 @@ class ScanMatcher {
   template <int Size>
   Information<Size> sum_of_all(const Viewpoint& view,
                                const MapOrigins* origins,
-                               std::vector<Information<Size>>& sums);
+                               Scratch<Size>& scratch);
   template <int Size>
   Information<Size> linearise_all(const Viewpoint& view,
                                   const MapOrigins* origins,
-                                  std::vector<Information<Size>>& sums);
+                                  Scratch<Size>& scratch);
 
   const PointCloud& points_base_;
   const LocalMap& map_;
@@ -104,9 +110,8 @@ class ScanMatcher {
   std::vector<Residual> residuals_;  ///< one a point, also where none was found
   std::vector<Found> found_;
   std::vector<std::uint8_t> patches_;  ///< whether a residual lies in it
-  // Of blocks.
-  std::vector<PoseInformation> sums_;
-  std::vector<PoseAndExtrinsicInformation> sums_with_extrinsic_;
+  Scratch<error::kPose> scratch_;
+  Scratch<error::kPoseAndExtrinsic> scratch_with_extrinsic_;
 };
 
 }  // namespace trigpoint::lio_mapper
