@@ -4,6 +4,7 @@
 // the robot drives.
 #include "trigpoint/bus/bus.hpp"
 #include "trigpoint/bus/convert.hpp"
+#include "trigpoint/bus/participant_of.hpp"
 #include "trigpoint/bus/topics.hpp"
 #include "trigpoint/geodesy/local_frame.hpp"
 #include "trigpoint/simulator/simulator.hpp"
@@ -174,13 +175,15 @@ class Road {
         topics::gps_odometry,
         [this](const nav_msgs::msg::Odometry& m, const bus::MessageInfo& info) {
           const std::scoped_lock lock(mutex_);
-          said_.push_back({bus::from_message(m), info.writer_guid.substr(0, 24), reached_s()});
+          said_.push_back(
+              {bus::from_message(m), bus::participant_of(info.writer_guid), reached_s()});
         });
     status_.emplace(*participant_,
                     topics::gps_status,
                     [this](const trigpoint_msgs::msg::GpsStatus& m, const bus::MessageInfo& info) {
                       const std::scoped_lock lock(mutex_);
-                      statuses_.emplace_back(info.writer_guid.substr(0, 24), bus::from_message(m));
+                      statuses_.emplace_back(bus::participant_of(info.writer_guid),
+                                             bus::from_message(m));
                     });
     datum_.emplace(*participant_,
                    topics::datum,

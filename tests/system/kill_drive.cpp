@@ -3,6 +3,7 @@
 #include "kill_drive.hpp"
 
 #include "trigpoint/bus/bus.hpp"
+#include "trigpoint/bus/participant_of.hpp"
 #include "trigpoint/bus/topics.hpp"
 #include "trigpoint/evaluation/trajectory_error.hpp"
 
@@ -67,7 +68,7 @@ class Ear {
         topic,
         [this, process](const nav_msgs::msg::Odometry&, const bus::MessageInfo& info) {
           const std::scoped_lock lock(mutex_);
-          words_[process].push_back({Clock::now(), info.writer_guid.substr(0, 24)});
+          words_[process].push_back({Clock::now(), bus::participant_of(info.writer_guid)});
         }));
   }
 

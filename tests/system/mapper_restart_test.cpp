@@ -4,6 +4,7 @@
 // started again; and with a disk that does not answer.
 #include "trigpoint/bus/bus.hpp"
 #include "trigpoint/bus/convert.hpp"
+#include "trigpoint/bus/participant_of.hpp"
 #include "trigpoint/bus/topics.hpp"
 #include "trigpoint/export/session.hpp"
 #include "trigpoint/lio_mapper/keyframe_store.hpp"
@@ -65,13 +66,14 @@ class Ear {
  public:
   Ear()
       : participant_(bus::Config{}, "restart_test"),
-        odometry_(participant_,
-                  topics::lio_odometry,
-                  [this](const nav_msgs::msg::Odometry& m, const bus::MessageInfo& info) {
-                    const std::scoped_lock lock(mutex_);
-                    odometries_.push_back({bus::from_message(m), info.writer_guid.substr(0, 24)});
-                    changed_.notify_all();
-                  }),
+        odometry_(
+            participant_,
+            topics::lio_odometry,
+            [this](const nav_msgs::msg::Odometry& m, const bus::MessageInfo& info) {
+              const std::scoped_lock lock(mutex_);
+              odometries_.push_back({bus::from_message(m), bus::participant_of(info.writer_guid)});
+              changed_.notify_all();
+            }),
         status_(participant_,
                 topics::lio_status,
                 [this](const trigpoint_msgs::msg::LioStatus& m, const bus::MessageInfo&) {

@@ -4,6 +4,7 @@
 // must outlive each of them.
 #include "trigpoint/bus/bus.hpp"
 #include "trigpoint/bus/convert.hpp"
+#include "trigpoint/bus/participant_of.hpp"
 #include "trigpoint/bus/topics.hpp"
 #include "trigpoint/evaluation/continuity.hpp"
 #include "trigpoint/export/session.hpp"
@@ -233,7 +234,7 @@ class Watch {
                  topics::gps_odometry,
                  [this](const nav_msgs::msg::Odometry&, const bus::MessageInfo& info) {
                    const std::scoped_lock lock(mutex_);
-                   writers_[info.writer_guid.substr(0, 24)] = info.writer_guid;
+                   writers_[bus::participant_of(info.writer_guid)] = info.writer_guid;
                  }),
         status_(participant_,
                 topics::fusion_status,

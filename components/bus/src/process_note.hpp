@@ -21,9 +21,4 @@ std::optional<unsigned> noted_process(std::span<const std::uint8_t> user_data);
 /// hexadecimal digits.
 std::optional<unsigned> process_in_fastdds_guid(const std::string& guid);
 
-/// The participant's part of a writer's GUID: 12 bytes in hexadecimal digits.
-inline std::string participant_of(const std::string& writer_guid) {
-  return writer_guid.substr(0, 24);
-}
-
 }  // namespace trigpoint::bus

@@ -2,6 +2,7 @@
 // Copyright the Trigpoint developers
 #include "gps_filter_check.hpp"
 
+#include "trigpoint/bus/participant_of.hpp"
 #include "trigpoint/shell/shell.hpp"
 #include "trigpoint/shell/stop_signal.hpp"
 #include "trigpoint/simulator/simulator.hpp"
@@ -56,13 +57,13 @@ std::string company_of(const std::vector<TopicSurvey>& surveys, const std::strin
   std::string names;
   for (const TopicSurvey& survey : surveys) {
     for (const std::string& other : writers_of(survey)) {
-      if (other.substr(0, 24) == writer.substr(0, 24)) {
+      if (bus::participant_of(other) == bus::participant_of(writer)) {
         names += (names.empty() ? "" : ", ") + survey.topic.name;
         break;
       }
     }
   }
-  return "program " + writer.substr(0, 24) + ", which writes " + names;
+  return "program " + bus::participant_of(writer) + ", which writes " + names;
 }
 
 /// False, with the reason on standard error, when a check would disturb somebody or cannot be made.

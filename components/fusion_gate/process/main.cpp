@@ -6,6 +6,7 @@
 #include "trigpoint/bus/config.hpp"
 #include "trigpoint/bus/convert.hpp"
 #include "trigpoint/bus/loop.hpp"
+#include "trigpoint/bus/participant_of.hpp"
 #include "trigpoint/bus/topics.hpp"
 #include "trigpoint/fusion_gate/fusion_gate.hpp"
 #include "trigpoint/pipeline/session_parts.hpp"
@@ -99,7 +100,7 @@ class Process {
                  topics::gps_odometry,
                  [this, &loop](const nav_msgs::msg::Odometry& m, const bus::MessageInfo& info) {
                    loop.post([this, odometry = bus::from_message(m), writer = info.writer_guid] {
-                     take(core_.on_gps_odometry(odometry, participant_of(writer)));
+                     take(core_.on_gps_odometry(odometry, bus::participant_of(writer)));
                    });
                  });
     gps_status_.emplace(
@@ -107,7 +108,7 @@ class Process {
         topics::gps_status,
         [this, &loop](const trigpoint_msgs::msg::GpsStatus& m, const bus::MessageInfo& info) {
           loop.post([this, status = bus::from_message(m), writer = info.writer_guid] {
-            take(core_.on_gps_status(status, participant_of(writer)));
+            take(core_.on_gps_status(status, bus::participant_of(writer)));
           });
         });
     lio_.emplace(participant_,
@@ -130,12 +131,6 @@ class Process {
         [this, &loop](const trigpoint_msgs::msg::LioStatus& m, const bus::MessageInfo&) {
           loop.post([this, status = bus::from_message(m)] { take(status); });
         });
-  }
-
-  /// A filter's two writers (odometry and status) share the 12 bytes of their participant's GUID
-  /// prefix (24 hexadecimal digits): that is the source's name.
-  static std::string participant_of(const std::string& writer_guid) {
-    return writer_guid.substr(0, 24);
   }
 
   void take(const LioStatus& status) {

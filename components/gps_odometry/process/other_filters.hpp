@@ -3,6 +3,7 @@
 #pragma once
 
 #include "trigpoint/base/messages.hpp"
+#include "trigpoint/bus/participant_of.hpp"
 
 #include <map>
 #include <optional>
@@ -12,8 +13,7 @@
 namespace trigpoint::gps_odometry {
 
 /// What other programs on the bus say of where the vehicle is, joined with the datum that they name
-/// elsewhere (gps/status of a filter, `datum` of the gate). Told apart by participant: the first 24
-/// hexadecimal digits of a writer's GUID.
+/// elsewhere (gps/status of a filter, `datum` of the gate). Told apart by participant.
 class OtherFilters {
  public:
   struct Heard {
@@ -21,18 +21,14 @@ class OtherFilters {
     std::string datum_id;
   };
 
-  static std::string participant_of(const std::string& writer_guid) {
-    return writer_guid.substr(0, 24);
-  }
-
   std::optional<Heard> on_odometry(const std::string& writer_guid, Odometry odometry) {
-    Said& said = said_[participant_of(writer_guid)];
+    Said& said = said_[bus::participant_of(writer_guid)];
     said.odometry = std::move(odometry);
     return joined(said);
   }
 
   std::optional<Heard> on_datum_id(const std::string& writer_guid, const std::string& id) {
-    Said& said = said_[participant_of(writer_guid)];
+    Said& said = said_[bus::participant_of(writer_guid)];
     said.datum_id = id;
     return joined(said);
   }

@@ -2,6 +2,8 @@
 // Copyright the Trigpoint developers
 #include "only_one.hpp"
 
+#include "trigpoint/bus/participant_of.hpp"
+
 #include <unistd.h>
 
 #include <cmath>
@@ -16,11 +18,6 @@ constexpr const char* kAge = "running_s";
 constexpr const char* kProcess = "process";
 /// Ages that differ by less say nothing about who was first.
 constexpr double kSameAge_s = 0.5;
-constexpr std::size_t kParticipantDigits = 24;  ///< of a writer's GUID in hexadecimal digits
-
-std::string participant_of(const std::string& writer_guid) {
-  return writer_guid.substr(0, kParticipantDigits);
-}
 
 }  // namespace
 
@@ -42,7 +39,7 @@ OnlyOne::OnlyOne(bus::Participant& participant,
                   loop_.post([this, other = std::move(*other)] { hear(other); });
                 }
               }) {
-  own_participant_ = participant_of(claims_.guid());
+  own_participant_ = bus::participant_of(claims_.guid());
   loop.every(std::chrono::seconds(1), [this] { claim(); });
 }
 
@@ -68,7 +65,7 @@ std::optional<OnlyOne::Claim> OnlyOne::claim_in(
     if (line.name != name) {
       continue;
     }
-    Claim claim{participant_of(writer), "?", 0.0};
+    Claim claim{bus::participant_of(writer), "?", 0.0};
     for (const auto& [key, value] : line.values) {
       if (key == kAge) {
         claim.age_s = std::strtod(value.c_str(), nullptr);

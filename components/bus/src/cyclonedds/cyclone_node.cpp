@@ -2,6 +2,8 @@
 // Copyright the Trigpoint developers
 #include "cyclone_node.hpp"
 
+#include "trigpoint/bus/participant_of.hpp"
+
 #include "../network.hpp"
 #include "../process_note.hpp"
 #include "../reader_events.hpp"
