@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
 #include "fix_reference.hpp"
+#include "gate_series.hpp"
 #include "gnuplot.hpp"
 #include "pictures.hpp"
 
@@ -19,13 +20,8 @@ namespace file = exporter::session_file;
 constexpr int kWidth_px = 1300;
 constexpr int kPanelHeight_px = 230;
 constexpr int kTimeLabel_px = 62;  ///< tics and label below the lowest panel
-constexpr double kLowestSigma_m = 1e-3;
-constexpr double kLowestError_m = 1e-3;
-constexpr double kUnknownSigma_m = 500.0;  ///< sqrt(kUnknownVariance) is 1000
-constexpr std::array<const char*, 3> kAxisNames{"east", "north", "up"};
 constexpr std::array<const char*, 3> kAxisFiles{"east.dat", "north.dat", "up.dat"};
 /// By AxisSource.
-constexpr std::array<const char*, 4> kSourceNames{"none", "lio", "fused", "gps"};
 constexpr std::array<const char*, 4> kSourceColours{"#d9d9d9", "#f7c59f", "#b9e3c0", "#b7d4f0"};
 constexpr const char* kOutageColour = "#8c2d2d";
 
@@ -39,7 +35,7 @@ SigmaRange sigma_range(const std::vector<FusionStatus>& rows, std::size_t axis) 
   SigmaRange range;
   for (const auto& row : rows) {
     for (const double value_m : {row.axes.at(axis).sigma_m, row.axes.at(axis).threshold_m}) {
-      if (std::isfinite(value_m) && value_m > 0.0 && value_m < kUnknownSigma_m) {
+      if (is_known_sigma(value_m)) {
         range.lowest_m = std::min(range.lowest_m, std::max(value_m, kLowestSigma_m));
         range.highest_m = std::max(range.highest_m, value_m);
       }
@@ -90,18 +86,12 @@ class UncertaintyPicture {
   /// Rectangles x y xlow xhigh ylow yhigh of the runs in which the gate chose one source.
   DataFile source_boxes(std::size_t axis, AxisSource source, const SigmaRange& range) const {
     DataFile boxes;
-    const auto& rows = data_.gate;
-    for (std::size_t i = 0; i < rows.size();) {
-      std::size_t end = i + 1;
-      while (end < rows.size() && rows[end].axes.at(axis).source == rows[i].axes.at(axis).source) {
-        ++end;
-      }
-      const double from = time(rows[i].stamp_ns);
-      const double to = time(rows[std::min(end, rows.size() - 1)].stamp_ns);
-      if (rows[i].axes.at(axis).source == source && to > from) {
+    for (const auto& run : source_runs(data_.gate, axis)) {
+      const double from = time(run.begin_ns);
+      const double to = time(run.end_ns);
+      if (run.source == source && to > from) {
         boxes.add({from, range.lowest_m, from, to, range.lowest_m, range.highest_m});
       }
-      i = end;
     }
     return boxes;
   }

@@ -3,6 +3,7 @@
 #include "page_plots.hpp"
 
 #include "fix_reference.hpp"
+#include "gate_series.hpp"
 #include "pictures.hpp"
 #include "svg_plot.hpp"
 #include "table.hpp"
@@ -21,12 +22,6 @@ namespace {
 
 using Points = std::vector<Eigen::Vector2d>;
 
-constexpr double kLowestSigma_m = 1e-3;
-constexpr double kLowestError_m = 1e-3;
-constexpr double kUnknownSigma_m = 500.0;  ///< sqrt(kUnknownVariance) is 1000
-constexpr std::array<const char*, 3> kAxisNames{"east", "north", "up"};
-/// By AxisSource.
-constexpr std::array<const char*, 4> kSourceNames{"none", "lio", "fused", "gps"};
 constexpr std::size_t kMostKinds = 8;  ///< rows of verdicts; the rarest share the last
 constexpr double kNameInRow = 0.3;     ///< parts of a row from its upper edge
 constexpr double kDotsInRow = 0.75;
@@ -74,17 +69,10 @@ class TimePlots {
   /// Stretches in which the gate took the axis from one source.
   std::vector<Band> choices(std::size_t axis) const {
     std::vector<Band> bands;
-    const auto& rows = data_.gate;
-    for (std::size_t i = 0; i < rows.size();) {
-      const auto source = rows[i].axes.at(axis).source;
-      std::size_t end = i + 1;
-      while (end < rows.size() && rows[end].axes.at(axis).source == source) {
-        ++end;
-      }
-      const double to_s = time_s(rows[std::min(end, rows.size() - 1)].stamp_ns);
-      const std::string name = kSourceNames.at(static_cast<std::size_t>(source));
-      bands.push_back({"choice-" + name, "gate: " + name, time_s(rows[i].stamp_ns), to_s});
-      i = end;
+    for (const auto& run : source_runs(data_.gate, axis)) {
+      const std::string name = kSourceNames.at(static_cast<std::size_t>(run.source));
+      bands.push_back(
+          {"choice-" + name, "gate: " + name, time_s(run.begin_ns), time_s(run.end_ns)});
     }
     return bands;
   }
@@ -94,10 +82,6 @@ class TimePlots {
   Window span_;
   std::vector<Window> outages_;
 };
-
-bool is_known_sigma(double sigma_m) {
-  return std::isfinite(sigma_m) && sigma_m > 0.0 && sigma_m < kUnknownSigma_m;
-}
 
 /// From the smallest value to the largest of all curves, with room at both ends.
 Axis axis_of(const std::vector<PlotCurve>& curves, bool logarithmic, const std::string& label) {
@@ -160,15 +144,14 @@ std::string plot_sigma(const SessionData& data, const TimePlots& time, std::size
   return plot(time, "sigma-" + name, "Uncertainty " + name, y, curves, time.choices(axis));
 }
 
-std::vector<PlotCurve> estimates(const SessionData& data,
-                                 const Points& gps,
+std::vector<PlotCurve> estimates(const Points& gps,
                                  const Points& fused,
-                                 const Points& lio) {
-  const auto T_map_odom = lio_placement(data);
+                                 const Points& lio,
+                                 bool is_lio_in_map) {
   return {{"gps", "gps filter", gps},
           {"fused", "fused", fused},
           // Last and thinner: where the two agree both are seen.
-          {"lio", T_map_odom ? "lio (yaw + translation)" : "lio (odom)", lio}};
+          {"lio", is_lio_in_map ? "lio (yaw + translation)" : "lio (odom)", lio}};
 }
 
 /// The most frequent kinds first.
@@ -276,10 +259,10 @@ std::string plot_height(const SessionData& data) {
   std::vector<PlotCurve> curves{
       {"fix", "fixes (antenna)", time.heights(thinned(fixes, 6000)), Drawn::kDots},
       {"truth", "truth", time.heights(data.truth)}};
-  for (auto& curve : estimates(data,
-                               time.heights(data.gps),
+  for (auto& curve : estimates(time.heights(data.gps),
                                time.heights(data.fused),
-                               time.heights(data.lio, T_map_odom.value_or(Pose{})))) {
+                               time.heights(data.lio, T_map_odom.value_or(Pose{})),
+                               T_map_odom.has_value())) {
     curves.push_back(std::move(curve));
   }
   return plot(time, "height", "Height in map", axis_of(curves, false, "z [m]"), curves);
@@ -291,10 +274,10 @@ std::string plot_error(const SessionData& data) {
   }
   const TimePlots time(data);
   const auto T_map_odom = lio_placement(data);
-  const auto curves = estimates(data,
-                                time.errors(data.gps),
+  const auto curves = estimates(time.errors(data.gps),
                                 time.errors(data.fused),
-                                T_map_odom ? time.errors(data.lio, *T_map_odom) : Points{});
+                                T_map_odom ? time.errors(data.lio, *T_map_odom) : Points{},
+                                T_map_odom.has_value());
   return plot(time, "error", "Distance from truth", axis_of(curves, true, "error [m]"), curves);
 }
 

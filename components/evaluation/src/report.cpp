@@ -127,14 +127,15 @@ ReportResult write_report(const std::string& session_folder, const ReportOptions
     draw_all(data, options, result);
   }
   const auto scores = score_session(data);
-  const std::vector<std::string> sections{
-      print_run(data) + (data.restarts.empty() ? "" : "\n" + print_restarts(data)),
-      "## Errors\n\n" + print_scores(data, scores),
-      print_alignment(data),
-      print_gate(data),
-      print_times(data),
-      print_accounting(data, found),
-      print_map(data)};
+  std::vector<std::string> sections{print_run(data),
+                                    print_restarts(data),
+                                    "## Errors\n\n" + print_scores(data, scores),
+                                    print_alignment(data),
+                                    print_gate(data),
+                                    print_times(data),
+                                    print_accounting(data, found),
+                                    print_map(data)};
+  std::erase(sections, "");
   if (options.page) {
     write_page(data, {scores, sections, result.problems, result.failures}, result);
   }

@@ -173,6 +173,19 @@ TEST(ReportPage, has_every_part_of_a_whole_session) {
   EXPECT_THAT(page, HasSubstr("dropout 1: 20.0 s"));
 }
 
+TEST(ReportPage, has_restarts_as_a_part_of_their_own) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  EXPECT_THAT(page_of(folder.path()), Not(HasSubstr("id=\"restarts\"")));
+  write_all(folder.file("restarts.csv"),
+            "unix_s,program,restarted,lived_s,what\n"
+            "1700000000,trigpoint_lio_mapper,1,23.1,\"was killed by signal 9 (Killed)\"\n");
+  const std::string page = page_of(folder.path());
+  EXPECT_THAT(page, HasSubstr("<section id=\"restarts\">\n<h2>Restarts</h2>"));
+  EXPECT_THAT(page, HasSubstr("<a href=\"#restarts\">Restarts</a>"));
+  EXPECT_EQ(malformed(page), "");
+}
+
 TEST(ReportPage, of_a_session_with_little_in_it_is_whole_too) {
   const ScratchFolder folder;
   write_all(folder.file("run.yaml"), "log: a\n");
