@@ -41,9 +41,22 @@ void describe(RobotConfig& config, ConfigFields& fields) {
                 config.twist_message,
                 "Its type; of an Odometry the twist is used",
                 {"TwistWithCovarianceStamped", "Odometry"});
-  fields.text("yaw_topic",
-              config.yaw_topic,
-              "Imu whose orientation is a heading by magnetometer or two antennas; empty: none");
+  fields.text(
+      "yaw_topic",
+      config.yaw_topic,
+      "Imu whose orientation is a heading by magnetometer or two antennas, for gps_odometry "
+      "and fusion_gate; empty: none");
+  fields.number(
+      "yaw_offset_rad",
+      config.yaw_offset_rad,
+      "Added to a heading: magnetic declination (east is negative), mounting of the antennas",
+      {-6.3, 6.3});
+  fields.number("yaw_default_sigma_rad",
+                config.yaw_default_sigma_rad,
+                "Sigma of a heading without covariance",
+                kPositive);
+  fields.number(
+      "yaw_floor_sigma_rad", config.yaw_floor_sigma_rad, "Least sigma of a heading", kPositive);
   fields.texts("imu_frame_ids",
                config.imu_frame_ids,
                "Frames in which IMU samples may be; others are refused. None listed: any");

@@ -66,6 +66,7 @@ class Process {
       }
     }
     subscribe_to_sensors(settings.robot, loop);
+    subscribe_to_headings(settings.robot, loop);
     subscribe_to_estimates(loop);
     loop.every(std::chrono::seconds(1), [this] { report_health(); });
   }
@@ -93,6 +94,18 @@ class Process {
                    [this, &loop](const sensor_msgs::msg::NavSatFix& m, const bus::MessageInfo&) {
                      loop.post([this, fix = bus::from_message(m)] { take(core_.on_fix(fix)); });
                    });
+  }
+
+  /// Two antennas or a magnetometer, where the robot has a topic for them.
+  void subscribe_to_headings(const RobotConfig& robot, bus::Loop& loop) {
+    if (!robot.yaw_topic.empty()) {
+      yaws_.emplace(
+          participant_,
+          topics::yaw.renamed(robot.yaw_topic),
+          [this, &loop](const sensor_msgs::msg::Imu& m, const bus::MessageInfo&) {
+            loop.post([this, yaw = bus::yaw_from_message(m)] { take(core_.on_yaw(yaw)); });
+          });
+    }
   }
 
   void subscribe_to_estimates(bus::Loop& loop) {
@@ -224,6 +237,7 @@ class Process {
   shell::OnlyOne only_one_;
   std::optional<bus::Subscription<sensor_msgs::msg::NavSatFix>> datums_;
   std::optional<bus::Subscription<sensor_msgs::msg::NavSatFix>> fixes_;
+  std::optional<bus::Subscription<sensor_msgs::msg::Imu>> yaws_;
   std::optional<bus::Subscription<nav_msgs::msg::Odometry>> gps_;
   std::optional<bus::Subscription<trigpoint_msgs::msg::GpsStatus>> gps_status_;
   std::optional<bus::Subscription<nav_msgs::msg::Odometry>> lio_;

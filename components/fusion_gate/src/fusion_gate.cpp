@@ -55,6 +55,12 @@ Output FusionGate::on_fix(const GnssFix& fix) {
   return out;
 }
 
+Output FusionGate::on_yaw(const YawMeasurement& yaw) {
+  Output out;
+  impl_->take_yaw(yaw, out);
+  return out;
+}
+
 Output FusionGate::on_datum(const Datum& datum) {
   Output out;
   if (impl_->frame && impl_->frame->datum().id() == datum.id()) {

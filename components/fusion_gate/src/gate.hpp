@@ -6,6 +6,7 @@
 #include "trigpoint/geodesy/local_frame.hpp"
 
 #include "alignment/alignment_window.hpp"
+#include "alignment/heading_prior.hpp"
 #include "alignment/placement_history.hpp"
 #include "alignment/pose_buffer.hpp"
 #include "checks/accepted_fix.hpp"
@@ -23,6 +24,7 @@
 #include <deque>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 
 namespace trigpoint::fusion_gate {
@@ -60,6 +62,8 @@ struct FusionGate::Impl {
   void judge_waiting(Output& out);
   bool is_mapper_awaited(Output& out);
   void note_refused(const ToldFix& told, const PoseBuffer::Answer& lio_pose);
+  void take_yaw(const YawMeasurement& yaw, Output& out);
+  void tell_of_heading(Output& out);
   void judge(const AcceptedFix& fix, const PoseBuffer::Answer& lio_pose, Output& out);
   void add_pair(const AcceptedFix& fix, const PoseBuffer::Sample& at_fix, Output& out);
   void make_rows(const AcceptedFix& fix, Output& out);
@@ -123,6 +127,8 @@ struct FusionGate::Impl {
   RowMaker rows;
   PoseBuffer lio_poses;
   AlignmentWindow window;
+  HeadingPrior heading;
+  std::set<std::string> headings_told;  // what was wrong with them, once each
   FixQueue queue;  // told of, waiting for earlier fixes and for LIO to cover their stamps
   std::optional<Nanoseconds> alignment_sent_ns;  // and the mapper has not said that it has it
   bool alignment_not_taken{false};               // the mapper was waited for, in vain

@@ -84,6 +84,33 @@ void FusionGate::Impl::judge(const AcceptedFix& fix,
   }
 }
 
+void FusionGate::Impl::take_yaw(const YawMeasurement& yaw, Output& out) {
+  const HeadingVerdict verdict = check_heading(yaw, robot);
+  if (!verdict.measurement) {
+    if (headings_told.insert(verdict.reason).second) {
+      tell(out, Severity::kWarning, verdict.reason.c_str(), verdict.text);
+    }
+  } else if (!aligned()) {
+    heading.hear(*verdict.measurement);
+  }
+}
+
+/// That a heading is not used is said once an alignment.
+void FusionGate::Impl::tell_of_heading(Output& out) {
+  constexpr const char* kCode = "heading_contradicted";
+  const std::optional<YawPrior> prior = heading.prior();
+  if (prior && window.solution() && window.solution()->contradicts_heading &&
+      headings_told.insert(kCode).second) {
+    tell(out,
+         Severity::kWarning,
+         kCode,
+         sentence("the headings of robot.yaw_topic put odom at yaw %.1f deg, GPS and LIO at %.1f "
+                  "deg: not used; look at robot.yaw_offset_rad",
+                  prior->yaw_rad * kDegrees,
+                  window.solution()->T_map_odom.yaw_rad * kDegrees));
+  }
+}
+
 void FusionGate::Impl::add_pair(const AcceptedFix& fix,
                                 const PoseBuffer::Sample& at_fix,
                                 Output& out) {
@@ -91,12 +118,15 @@ void FusionGate::Impl::add_pair(const AcceptedFix& fix,
   const Eigen::Vector3d antenna_odom_m = at_fix.T_frame_child * robot.antenna_position_base_m;
   const Eigen::Vector3d variance_m2 = floored(fix.covariance_map_m2, config.min_sigma_m).diagonal();
   const Witness witness = witness_of(fix, at_fix);
+  heading.match(lio_poses);
+  window.set_heading(heading.prior());
   const bool added = window.add({fix.stamp_ns,
                                  fix.antenna_map_m,
                                  variance_m2,
                                  antenna_odom_m,
                                  at_fix.distance_m,
                                  least_share_of(witness).mean()});
+  tell_of_heading(out);
   if (!window.admitted()) {
     const std::string why = window.obstacle().value_or("no solution");
     verdicts.record(fix.stamp_ns,
@@ -186,12 +216,15 @@ void FusionGate::Impl::take_lio_status(const LioStatus& next, Output& out) {
   }
   if (aligned() && !was_aligned) {
     window.clear();
+    heading.clear();
   }
 }
 
 void FusionGate::Impl::begin_epoch(const LioStatus& next, Output& out) {
   lio_poses.forget_before(next.stamp_ns);
   window.clear();
+  heading.clear();
+  headings_told.clear();
   refuse_waiting({"odom_epoch", "LIO began another odom epoch meanwhile"});
   alignment_sent_ns.reset();
   alignment_not_taken = false;

@@ -24,8 +24,6 @@ constexpr double kNothing_m2ps2 = 1e8;
 constexpr double kHugeVariance = 1e6;
 constexpr int kRefusedInARow = 20;
 constexpr Nanoseconds kDistrust_ns = 20 * kNanosecondsPerSecond;
-constexpr double kUnitTolerance = 0.05;
-constexpr double kLeastNorm = 1e-6;  // drivers without attitude send zeros
 
 std::string sentence(const char* format, double value) {
   std::array<char, 160> text{};
@@ -58,7 +56,7 @@ Matrix3d usable_covariance(const TwistMeasurement& twist, const Config& config) 
 
 }  // namespace
 
-AidingVerdict<CheckedTwist> check_twist(const TwistMeasurement& twist, const Config& config) {
+TwistVerdict check_twist(const TwistMeasurement& twist, const Config& config) {
   if (!is_usable_stamp(twist.stamp_ns)) {
     return {std::nullopt,
             "twist_stamp_out_of_range",
@@ -85,40 +83,6 @@ bool passes_gate(AidingState& aiding, Nanoseconds stamp_ns, double distance2, do
     aiding.twist_distrusted_until_ns = stamp_ns + kDistrust_ns;
   }
   return distance2 <= gate && stamp_ns >= aiding.twist_distrusted_until_ns;
-}
-
-AidingVerdict<CheckedYaw> check_yaw(const YawMeasurement& yaw, const Config& config) {
-  if (!is_usable_stamp(yaw.stamp_ns)) {
-    return {
-        std::nullopt,
-        "yaw_stamp_out_of_range",
-        sentence("Yaw refused: its stamp is %g s, expected 0 to 8e9.", to_seconds(yaw.stamp_ns))};
-  }
-  if (!yaw.q_world_base || yaw.q_world_base->coeffs().norm() < kLeastNorm) {
-    return {
-        std::nullopt, "yaw_without_orientation", "Yaw refused: the message has no orientation."};
-  }
-  const double norm = yaw.q_world_base->coeffs().norm();
-  if (!std::isfinite(norm) || std::isnan(yaw.variance_rad2)) {
-    return {std::nullopt, "yaw_not_finite", "Yaw refused: a value is not a number."};
-  }
-  if (std::abs(norm - 1.0) > kUnitTolerance) {
-    return {std::nullopt,
-            "yaw_not_unit",
-            sentence("Yaw refused: its quaternion has the length %g, expected 1.", norm)};
-  }
-  if (yaw.variance_rad2 > kHugeVariance) {
-    return {std::nullopt,
-            "yaw_unknown",
-            sentence("Yaw refused: its variance is %g rad^2.", yaw.variance_rad2)};
-  }
-  const double sigma =
-      yaw.variance_rad2 > 0.0 ? std::sqrt(yaw.variance_rad2) : config.yaw_default_sigma_rad;
-  return {CheckedYaw{yaw.stamp_ns,
-                     wrap_angle(yaw_of(yaw.q_world_base->normalized()) + config.yaw_offset_rad),
-                     std::max(sigma, config.yaw_floor_sigma_rad)},
-          "",
-          ""};
 }
 
 }  // namespace trigpoint::gps_odometry

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
-// Optional inputs: the velocity of the vehicle (wheels) and its heading (magnetometer, two
-// antennas). What such a message must be before it comes near the filter.
+// Optional inputs: the velocity of the vehicle (wheels) and its heading (base/heading.hpp). What
+// the former must be before it comes near the filter.
 #pragma once
 
+#include "trigpoint/base/heading.hpp"
 #include "trigpoint/base/measurements.hpp"
 #include "trigpoint/gps_odometry/config.hpp"
 
@@ -21,22 +22,13 @@ struct CheckedTwist {
   Eigen::Matrix3d covariance_m2ps2{Eigen::Matrix3d::Identity()};  ///< wide where nothing is known
 };
 
-/// A heading that may be used: counter-clockwise from map's east.
-struct CheckedYaw {
-  Nanoseconds stamp_ns{0};
-  double yaw_map_rad{0.0};
-  double sigma_rad{0.0};
-};
-
-template <typename Checked>
-struct AidingVerdict {
-  std::optional<Checked> measurement;  ///< nullopt: refused
-  std::string reason;                  ///< name of the counter
+struct TwistVerdict {
+  std::optional<CheckedTwist> measurement;  ///< nullopt: refused
+  std::string reason;                       ///< name of the counter
   std::string text;
 };
 
-AidingVerdict<CheckedTwist> check_twist(const TwistMeasurement& twist, const Config& config);
-AidingVerdict<CheckedYaw> check_yaw(const YawMeasurement& yaw, const Config& config);
+TwistVerdict check_twist(const TwistMeasurement& twist, const Config& config);
 
 /// Part of a Track: what aiding has done and what it waits for.
 struct AidingState {

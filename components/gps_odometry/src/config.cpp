@@ -102,15 +102,6 @@ void describe_aiding(Config& c, ConfigFields& f) {
            c.yaw_interval_s,
            "Headings (robot.yaw_topic): shortest time between two that are used",
            kPositive);
-  f.number("yaw_offset_rad",
-           c.yaw_offset_rad,
-           "Added to a heading: magnetic declination (east is negative), mounting of the antennas",
-           {-6.3, 6.3});
-  f.number("yaw_default_sigma_rad",
-           c.yaw_default_sigma_rad,
-           "Sigma of a heading without covariance",
-           kPositive);
-  f.number("yaw_floor_sigma_rad", c.yaw_floor_sigma_rad, "Least sigma of a heading", kPositive);
 }
 
 void describe_checks(Config& c, ConfigFields& f) {

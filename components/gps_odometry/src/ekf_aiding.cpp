@@ -35,7 +35,7 @@ FixOutcome EkfTracker::apply(EkfTrack& track, const CheckedTwist& twist) const {
   return {true, "", ""};
 }
 
-FixOutcome EkfTracker::apply(EkfTrack& track, const CheckedYaw& yaw) const {
+FixOutcome EkfTracker::apply(EkfTrack& track, const Heading& yaw) const {
   AidingState& aiding = track.aiding;
   if (track.phase == Phase::kNoImu ||
       to_seconds(yaw.stamp_ns - aiding.yaw_ns) < config_.yaw_interval_s) {

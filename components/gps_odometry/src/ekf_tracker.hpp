@@ -50,7 +50,7 @@ class EkfTracker {
   /// Goes on from another filter's state; the phase becomes kRunning.
   void warm_start(EkfTrack& track, const WarmState& state) const;
   FixOutcome apply(EkfTrack& track, const CheckedTwist& twist) const;
-  FixOutcome apply(EkfTrack& track, const CheckedYaw& yaw) const;
+  FixOutcome apply(EkfTrack& track, const Heading& yaw) const;
 
   /// Position of base_link with covariance as it may be published, order x y z roll pitch yaw about
   /// the axes of map.

@@ -28,7 +28,7 @@ class BufferedFilter : public Filter {
 
   FixOutcome insert(const CheckedTwist& twist) override { return buffer_.insert(twist); }
 
-  FixOutcome insert(const CheckedYaw& yaw) override { return buffer_.insert(yaw); }
+  FixOutcome insert(const Heading& yaw) override { return buffer_.insert(yaw); }
 
   bool is_too_old(Nanoseconds stamp_ns) const override { return buffer_.is_too_old(stamp_ns); }
 

@@ -28,7 +28,7 @@ class Filter {
   /// The fix must be neither too old nor a duplicate.
   virtual FixOutcome insert(const MapFix& fix) = 0;
   virtual FixOutcome insert(const CheckedTwist& twist) = 0;
-  virtual FixOutcome insert(const CheckedYaw& yaw) = 0;
+  virtual FixOutcome insert(const Heading& yaw) = 0;
   virtual bool is_too_old(Nanoseconds stamp_ns) const = 0;
   virtual bool has_fix_at(Nanoseconds stamp_ns) const = 0;
   /// What is held of the fixes that a late one can still change, by stamp.

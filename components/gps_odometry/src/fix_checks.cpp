@@ -146,10 +146,6 @@ FixVerdict refuse_message(const GnssFix& fix) {
 
 }  // namespace
 
-bool is_usable_stamp(Nanoseconds stamp_ns) {
-  return stamp_ns >= 0 && stamp_ns < 8'000'000'000 * kNanosecondsPerSecond;
-}
-
 FixVerdict check_fix(const GnssFix& fix, const Config& config) {
   if (FixVerdict refused = refuse_message(fix); !refused.reason.empty()) {
     return refused;

@@ -31,9 +31,6 @@ struct FixVerdict {
   std::string text;               ///< a sentence with the value and what was expected
 };
 
-/// Differences of usable stamps fit into 64 bits.
-bool is_usable_stamp(Nanoseconds stamp_ns);
-
 /// Checks of one message by itself: numbers, status, place, covariance.
 FixVerdict check_fix(const GnssFix& fix, const Config& config);
 

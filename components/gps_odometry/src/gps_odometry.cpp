@@ -28,14 +28,14 @@ constexpr double kFrozenSpeed_mps = 0.5;
 }  // namespace
 
 struct GpsOdometry::Impl {
-  Impl(const Config& c, const RobotConfig& robot)
+  Impl(const Config& c, const RobotConfig& r)
       : config(c),
+        robot(r),
         datum(configured_datum(c)),
         imu_checks(c, robot.q_base_imu()),
         filter(make_filter(c, robot)),
         election(c),
-        admission(c, robot),
-        geoid_undulation_m(robot.geoid_undulation_m) {
+        admission(c, robot) {
     if (datum) {
       frame.emplace(make_frame(*datum, config));
     }
@@ -47,8 +47,8 @@ struct GpsOdometry::Impl {
   bool is_out_of_place(CheckedFix& fix, Nanoseconds stamp_ns, Output& output);
   bool is_refused(const std::optional<Refusal>& refusal, Nanoseconds stamp_ns, Output& output);
   void compare_turns(const MapFix& fix, Output& output);
-  template <typename Checked>
-  void take_aiding(const AidingVerdict<Checked>& verdict,
+  template <typename Verdict>
+  void take_aiding(const Verdict& verdict,
                    const std::string& kind,
                    Nanoseconds stamp_ns,
                    Output& output);
@@ -67,6 +67,7 @@ struct GpsOdometry::Impl {
   Surroundings around() const;
 
   Config config;
+  RobotConfig robot;
   std::optional<Datum> datum;
   /// The datum's, or until there is one that of the first fix: heading is searched meanwhile.
   std::optional<geodesy::LocalFrame> frame;
@@ -77,7 +78,6 @@ struct GpsOdometry::Impl {
   FrozenReceiver frozen;
   WarmStartListener warm;
   Admission admission;
-  double geoid_undulation_m;
   Counters counters;
   std::uint64_t fixes_received{0};
   std::uint64_t imu_received{0};
@@ -141,7 +141,7 @@ std::optional<CheckedFix> GpsOdometry::Impl::checked(const GnssFix& message, Out
     return std::nullopt;
   }
   GnssFix above_ellipsoid = message;
-  above_ellipsoid.altitude_m += geoid_undulation_m;
+  above_ellipsoid.altitude_m += robot.geoid_undulation_m;
   FixVerdict verdict = check_fix(above_ellipsoid, config);
   if (!verdict.reason.empty()) {
     refuse(verdict.reason, verdict.text, message.stamp_ns, output);
@@ -238,8 +238,8 @@ void GpsOdometry::Impl::compare_turns(const MapFix& fix, Output& output) {
   }
 }
 
-template <typename Checked>
-void GpsOdometry::Impl::take_aiding(const AidingVerdict<Checked>& verdict,
+template <typename Verdict>
+void GpsOdometry::Impl::take_aiding(const Verdict& verdict,
                                     const std::string& kind,
                                     Nanoseconds stamp_ns,
                                     Output& output) {
@@ -441,7 +441,7 @@ Output GpsOdometry::on_twist(const TwistMeasurement& twist) {
 
 Output GpsOdometry::on_yaw(const YawMeasurement& yaw) {
   Output output;
-  impl_->take_aiding(check_yaw(yaw, impl_->config), "yaw", yaw.stamp_ns, output);
+  impl_->take_aiding(check_heading(yaw, impl_->robot), "yaw", yaw.stamp_ns, output);
   return output;
 }
 

@@ -40,7 +40,7 @@ TwistFit fit(const Eskf18& filter,
           H * filter.P * H.transpose() + twist.covariance_m2ps2};
 }
 
-double misfit(const Eskf18& filter, const CheckedYaw& heard) {
+double misfit(const Eskf18& filter, const Heading& heard) {
   const Jacobian1 H = yaw_jacobian(filter);
   const double S = (H * filter.P * H.transpose()).value() + heard.sigma_rad * heard.sigma_rad;
   const double innovation = wrap_angle(heard.yaw_map_rad - yaw(filter));
@@ -81,7 +81,7 @@ FixOutcome InsTracker::apply(InsTrack& track, const CheckedTwist& twist) const {
 }
 
 /// Of two headings it speaks for one, once: repeated, a wrong one would outvote the fixes.
-void InsTracker::weigh_yaw(InsTrack& track, const CheckedYaw& heard) const {
+void InsTracker::weigh_yaw(InsTrack& track, const Heading& heard) const {
   if (track.has_rival && !track.yaw_weighed) {
     const double gain = 0.5 * (misfit(track.rival, heard) - misfit(track.filter, heard));
     track.log_ratio += std::clamp(gain, -kMostOfAllYaws, kMostOfAllYaws);
@@ -89,7 +89,7 @@ void InsTracker::weigh_yaw(InsTrack& track, const CheckedYaw& heard) const {
   }
 }
 
-FixOutcome InsTracker::apply(InsTrack& track, const CheckedYaw& heard) const {
+FixOutcome InsTracker::apply(InsTrack& track, const Heading& heard) const {
   AidingState& aiding = track.aiding;
   if (track.phase == Phase::kNoImu ||
       to_seconds(heard.stamp_ns - aiding.yaw_ns) < config_.yaw_interval_s) {

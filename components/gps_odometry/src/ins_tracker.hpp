@@ -60,7 +60,7 @@ class InsTracker {
   /// Goes on from another filter's state; the phase becomes kRunning.
   void warm_start(InsTrack& track, const WarmState& state) const;
   FixOutcome apply(InsTrack& track, const CheckedTwist& twist) const;
-  FixOutcome apply(InsTrack& track, const CheckedYaw& yaw) const;
+  FixOutcome apply(InsTrack& track, const Heading& yaw) const;
 
   Estimate estimate(const InsTrack& track) const;
 
@@ -95,7 +95,7 @@ class InsTracker {
   void constrain(InsTrack& track, const CheckedImu& imu) const;
 
   // ins_aiding.cpp: optional inputs.
-  void weigh_yaw(InsTrack& track, const CheckedYaw& yaw) const;
+  void weigh_yaw(InsTrack& track, const Heading& yaw) const;
   CoursePoint course_point(const InsTrack& track, const MapFix& fix) const;
   void prove_heading(InsTrack& track, const MapFix& fix) const;
 

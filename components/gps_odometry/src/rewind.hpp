@@ -33,7 +33,7 @@ class RewindBuffer {
 
   /// Neither may be too old.
   FixOutcome insert(const CheckedTwist& twist);
-  FixOutcome insert(const CheckedYaw& yaw);
+  FixOutcome insert(const Heading& yaw);
 
   bool is_too_old(Nanoseconds stamp_ns) const;
   bool has_fix_at(Nanoseconds stamp_ns) const;
@@ -60,7 +60,7 @@ class RewindBuffer {
 
  private:
   using Measurement =
-      std::variant<CheckedImu, MapFix, CheckedTwist, CheckedYaw>;  // in the order of equal stamps
+      std::variant<CheckedImu, MapFix, CheckedTwist, Heading>;  // in the order of equal stamps
 
   struct Entry {
     Nanoseconds stamp_ns{0};
@@ -108,7 +108,7 @@ FixOutcome RewindBuffer<TrackerType>::insert(const CheckedTwist& twist) {
 }
 
 template <typename TrackerType>
-FixOutcome RewindBuffer<TrackerType>::insert(const CheckedYaw& yaw) {
+FixOutcome RewindBuffer<TrackerType>::insert(const Heading& yaw) {
   const FixOutcome outcome = insert(yaw.stamp_ns, yaw);
   forget_old();
   return outcome;
@@ -147,7 +147,7 @@ FixOutcome RewindBuffer<TrackerType>::apply(Entry& entry, const State& before) {
   } else if (const auto* twist = std::get_if<CheckedTwist>(&entry.measurement)) {
     outcome = tracker_.apply(entry.after, *twist);
   } else {
-    outcome = tracker_.apply(entry.after, std::get<CheckedYaw>(entry.measurement));
+    outcome = tracker_.apply(entry.after, std::get<Heading>(entry.measurement));
   }
   if (!entry.after.filter.is_finite()) {
     // Cannot be, and must not spread if it is: start again from the next sample.
@@ -257,7 +257,7 @@ void RewindBuffer<TrackerType>::change_frame(const Eigen::Matrix3d& R_new_old,
     if (auto* fix = std::get_if<MapFix>(&entry.measurement)) {
       fix->antenna_map_m = R_new_old * fix->antenna_map_m + t_new_old;
       fix->covariance_map_m2 = R_new_old * fix->covariance_map_m2 * R_new_old.transpose();
-    } else if (auto* yaw = std::get_if<CheckedYaw>(&entry.measurement)) {
+    } else if (auto* yaw = std::get_if<Heading>(&entry.measurement)) {
       yaw->yaw_map_rad += turn_rad;
     }
   }

@@ -127,7 +127,7 @@ FixOutcome StrictFilter::insert(const CheckedTwist&) {
   return {false, "twist_not_an_input", "Refused: the published filter has no such input here."};
 }
 
-FixOutcome StrictFilter::insert(const CheckedYaw&) {
+FixOutcome StrictFilter::insert(const Heading&) {
   return {false, "yaw_not_an_input", "Refused: the published filter has no such input here."};
 }
 

@@ -28,7 +28,7 @@ class StrictFilter : public Filter {
   FixOutcome insert(const MapFix& fix) override;
   /// The published filter is compared with GPS and IMU alone.
   FixOutcome insert(const CheckedTwist& twist) override;
-  FixOutcome insert(const CheckedYaw& yaw) override;
+  FixOutcome insert(const Heading& yaw) override;
   /// Also what is older than the newest fix: the published filter drops it.
   bool is_too_old(Nanoseconds stamp_ns) const override;
 

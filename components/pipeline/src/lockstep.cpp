@@ -47,7 +47,10 @@ struct Lockstep::Impl {
 
   void feed(const TwistMeasurement& twist, Step& step) { take(gps.on_twist(twist), step); }
 
-  void feed(const YawMeasurement& yaw, Step& step) { take(gps.on_yaw(yaw), step); }
+  void feed(const YawMeasurement& yaw, Step& step) {
+    take(gate.on_yaw(yaw), step);
+    take(gps.on_yaw(yaw), step);
+  }
 
   void feed(const PointCloudMessage& cloud, Step& step) { take(mapper.on_cloud(cloud), step); }
 

@@ -32,6 +32,7 @@ struct Scenario {
   Config config{hard_mode()};
   YawPose T_map_odom{2.9, {20.0, -30.0, 4.0}};
   Eigen::Vector3d antenna_position_base_m{0.4, 0.1, 0.9};
+  double yaw_floor_sigma_rad{RobotConfig{}.yaw_floor_sigma_rad};
   double duration_s{30.0};
   double speed_mps{1.2};
   double gps_odometry_hz{20.0};
@@ -201,6 +202,7 @@ class SimulatedDrive {
   RobotConfig robot() const {
     RobotConfig config;
     config.antenna_position_base_m = scenario_.antenna_position_base_m;
+    config.yaw_floor_sigma_rad = scenario_.yaw_floor_sigma_rad;
     return config;
   }
 

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <optional>
 #include <random>
 
 namespace trigpoint::fusion_gate {
@@ -23,6 +24,7 @@ struct Drive {
   double turn_radps{0.0};
   double sigma_m{0.02};
   double claimed_over_true{1.0};  ///< sigmas
+  double heading_sigma_rad{0.0};  ///< of a measured heading; 0: there is none
 };
 
 /// Noise-free pairs along a straight line or an arc.
@@ -144,7 +146,14 @@ Spread measure_spread(const Drive& drive) {
       pair.variance_map_m2 *= drive.claimed_over_true * drive.claimed_over_true;
       pair.least_share = 1.0 / (drive.claimed_over_true * drive.claimed_over_true);
     }
-    const AlignmentSolution solution = solve_alignment(pairs, config).value();
+    std::mt19937 generator(1000 + seed);
+    std::normal_distribution<double> heading_error_rad(0.0, drive.heading_sigma_rad);
+    std::optional<YawPrior> heading;
+    if (drive.heading_sigma_rad > 0.0) {
+      heading = {wrap_angle(kTruth.yaw_rad + heading_error_rad(generator)),
+                 drive.heading_sigma_rad};
+    }
+    const AlignmentSolution solution = solve_alignment(pairs, config, 0.0, heading).value();
     // LIO's walk is counted back from the newest pair: the truth is the transform that maps the
     // newest pair's drifted position to where it is.
     const Eigen::Vector3d drift_m =
@@ -185,6 +194,20 @@ TEST(YawAlignment, predicts_the_yaw_error_of_coarse_gps_with_correlated_errors) 
   const Spread spread = measure_spread(drive);
   EXPECT_GT(spread.yaw_rms_rad / spread.yaw_sigma_rad, kLowestRatio);
   EXPECT_LT(spread.yaw_rms_rad / spread.yaw_sigma_rad, kHighestRatio);
+}
+
+TEST(YawAlignment, predicts_the_yaw_error_with_a_heading_as_good_as_the_way) {
+  Drive drive;
+  drive.sigma_m = 1.0;
+  drive.fixes = 60;
+  const Spread alone = measure_spread(drive);
+  drive.heading_sigma_rad = alone.yaw_sigma_rad;
+  const Spread spread = measure_spread(drive);
+  EXPECT_GT(spread.yaw_rms_rad / spread.yaw_sigma_rad, kLowestRatio);
+  EXPECT_LT(spread.yaw_rms_rad / spread.yaw_sigma_rad, kHighestRatio);
+  EXPECT_NEAR(spread.yaw_sigma_rad / alone.yaw_sigma_rad, std::sqrt(0.5), 0.07);
+  EXPECT_GT(spread.nees, 4.0 * 0.5);
+  EXPECT_LT(spread.nees, 4.0 * 1.25);
 }
 
 TEST(YawAlignment, believes_fixes_that_scatter_less_than_a_cautious_filter_says) {

@@ -78,38 +78,6 @@ TEST(CheckTwist, makes_any_covariance_positive) {
   EXPECT_EQ(verdict.measurement->covariance_m2ps2.llt().info(), Eigen::Success);
 }
 
-TEST(CheckYaw, refuses_what_is_no_heading_by_name) {
-  const auto reason = [](auto spoil) {
-    YawMeasurement yaw = good_yaw();
-    spoil(yaw);
-    const auto verdict = check_yaw(yaw, Config{});
-    EXPECT_FALSE(verdict.measurement);
-    return verdict.reason;
-  };
-  EXPECT_EQ(reason([](YawMeasurement& y) { y.q_world_base.reset(); }), "yaw_without_orientation");
-  EXPECT_EQ(reason([](YawMeasurement& y) { y.q_world_base->coeffs().setZero(); }),
-            "yaw_without_orientation");
-  EXPECT_EQ(reason([](YawMeasurement& y) { y.q_world_base->coeffs() *= 1.2; }), "yaw_not_unit");
-  EXPECT_EQ(reason([](YawMeasurement& y) { y.q_world_base->x() = kNaN; }), "yaw_not_finite");
-  EXPECT_EQ(reason([](YawMeasurement& y) { y.variance_rad2 = kNaN; }), "yaw_not_finite");
-  EXPECT_EQ(reason([](YawMeasurement& y) { y.variance_rad2 = 1e9; }), "yaw_unknown");
-  EXPECT_EQ(reason([](YawMeasurement& y) { y.stamp_ns = -5; }), "yaw_stamp_out_of_range");
-}
-
-TEST(CheckYaw, normalises_adds_the_offset_and_knows_a_floor) {
-  Config config;
-  config.yaw_offset_rad = -0.2;
-  YawMeasurement yaw = good_yaw();
-  yaw.q_world_base->coeffs() *= 1.02;
-  yaw.variance_rad2 = 1e-12;
-  const auto verdict = check_yaw(yaw, config);
-  ASSERT_TRUE(verdict.measurement);
-  EXPECT_NEAR(verdict.measurement->yaw_map_rad, 0.1, 1e-9);
-  EXPECT_EQ(verdict.measurement->sigma_rad, config.yaw_floor_sigma_rad);
-  yaw.variance_rad2 = 0.0;
-  EXPECT_EQ(check_yaw(yaw, config).measurement->sigma_rad, config.yaw_default_sigma_rad);
-}
-
 TEST(PassesGate, does_not_hear_wheels_for_a_while_after_many_refusals) {
   AidingState aiding;
   for (int i = 0; i < 20; ++i) {

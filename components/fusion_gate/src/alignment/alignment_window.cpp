@@ -2,9 +2,18 @@
 // Copyright the Trigpoint developers
 #include "alignment/alignment_window.hpp"
 
+#include "trigpoint/base/so3.hpp"
+
 #include <algorithm>
+#include <cmath>
 
 namespace trigpoint::fusion_gate {
+
+namespace {
+
+constexpr double kContradiction_sigmas = 3.0;
+
+}  // namespace
 
 bool AlignmentWindow::add(const AlignmentPair& pair) {
   if (is_redundant(pair)) {
@@ -45,8 +54,22 @@ void AlignmentWindow::bound() {
   spacing_factor_ *= 2.0;
 }
 
+/// A wrong heading must not hold the alignment up: 3 sigma of both apart it is left out.
+std::optional<AlignmentSolution> AlignmentWindow::solve(
+    const std::vector<AlignmentPair>& pairs) const {
+  auto alone = solve_alignment(pairs, config_, scale_sigma_);
+  if (!heading_ || !alone) {
+    return alone;
+  }
+  const double apart_rad = wrap_angle(heading_->yaw_rad - alone->T_map_odom.yaw_rad);
+  const double sigma_rad = std::hypot(alone->yaw_sigma_rad(), heading_->sigma_rad);
+  alone->contradicts_heading = std::abs(apart_rad) > kContradiction_sigmas * sigma_rad;
+  return alone->contradicts_heading ? alone
+                                    : solve_alignment(pairs, config_, scale_sigma_, heading_);
+}
+
 void AlignmentWindow::solve() {
-  solution_ = solve_alignment(pairs_, config_, scale_sigma_);
+  solution_ = solve(pairs_);
   obstacle_ = solution_ ? find_obstacle(*solution_, config_)
                         : std::optional<std::string>("no finite solution");
   // A wrong stretch at the start must not block the alignment for as long as it is in the window.
@@ -54,7 +77,7 @@ void AlignmentWindow::solve() {
   while (obstacle_ && pairs_.size() - skipped >= static_cast<std::size_t>(config_.min_pairs)) {
     const std::vector<AlignmentPair> newest(pairs_.begin() + static_cast<std::ptrdiff_t>(skipped),
                                             pairs_.end());
-    const auto candidate = solve_alignment(newest, config_, scale_sigma_);
+    const auto candidate = solve(newest);
     if (candidate && !find_obstacle(*candidate, config_)) {
       solution_ = candidate;
       obstacle_.reset();

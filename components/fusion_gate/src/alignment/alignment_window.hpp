@@ -22,6 +22,10 @@ class AlignmentWindow {
 
   void clear();
 
+  /// What a measured heading says, from the next pair on. It is left out of a solution whose pairs
+  /// alone contradict it.
+  void set_heading(const std::optional<YawPrior>& heading) { heading_ = heading; }
+
   /// Of the whole window; when that is refused for its residuals, of the newest part that is not.
   const std::optional<AlignmentSolution>& solution() const { return solution_; }
 
@@ -34,11 +38,13 @@ class AlignmentWindow {
   bool is_redundant(const AlignmentPair& pair) const;
   void bound();
   void solve();
+  std::optional<AlignmentSolution> solve(const std::vector<AlignmentPair>& pairs) const;
 
   AlignmentConfig config_;
   double scale_sigma_;
   std::vector<AlignmentPair> pairs_;
   double spacing_factor_{1.0};
+  std::optional<YawPrior> heading_;
   std::optional<AlignmentSolution> solution_;
   std::optional<std::string> obstacle_{"no matched fix yet"};
 };

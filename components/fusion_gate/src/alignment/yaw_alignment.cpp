@@ -8,6 +8,7 @@
 
 #include "trigpoint/base/so3.hpp"
 
+#include "alignment/median.hpp"
 #include "sentence.hpp"
 #include <Eigen/Cholesky>
 
@@ -40,14 +41,11 @@ double robust_weight(double squared_sigmas) {
   return 1.0 / (1.0 + excess / (kCauchyScale * kCauchyScale));
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// [1]: minimises sum w |p_map - (R p_odom + t)|^2 over yaw and translation.
-YawPose closed_form(const std::vector<AlignmentPair>& pairs, const Weights& weights) {
+/// With a given yaw only the position is asked for.
+YawPose closed_form(const std::vector<AlignmentPair>& pairs,
+                    const Weights& weights,
+                    const std::optional<YawPrior>& heading) {
   Eigen::Vector3d mean_map = Eigen::Vector3d::Zero();
   Eigen::Vector3d mean_odom = Eigen::Vector3d::Zero();
   for (std::size_t k = 0; k < pairs.size(); ++k) {
@@ -66,7 +64,7 @@ YawPose closed_form(const std::vector<AlignmentPair>& pairs, const Weights& weig
     dot += w * (a.x() * b.x() + a.y() * b.y());
     cross += w * (a.x() * b.y() - a.y() * b.x());
   }
-  const double yaw_rad = std::atan2(cross, dot);
+  const double yaw_rad = heading ? heading->yaw_rad : std::atan2(cross, dot);
   return {yaw_rad, mean_map - from_yaw(yaw_rad) * mean_odom};
 }
 
@@ -92,13 +90,14 @@ Eigen::Vector3d residual_of(const AlignmentPair& pair, const ScaledPose& estimat
 }
 
 /// A start that a few wild fixes cannot turn: weights from the residuals' own median.
-YawPose robust_closed_form(const std::vector<AlignmentPair>& pairs) {
+YawPose robust_closed_form(const std::vector<AlignmentPair>& pairs,
+                           const std::optional<YawPrior>& heading) {
   Weights base(static_cast<Eigen::Index>(pairs.size()));
   for (std::size_t k = 0; k < pairs.size(); ++k) {
     base[static_cast<Eigen::Index>(k)] = 1.0 / pairs[k].variance_map_m2.head<2>().sum();
   }
   Weights weights = base;
-  YawPose estimate = closed_form(pairs, weights);
+  YawPose estimate = closed_form(pairs, weights, heading);
   for (int iteration = 0; iteration < kClosedFormIterations; ++iteration) {
     const Pose T_map_odom = estimate.pose();
     std::vector<double> squared_sigmas;
@@ -110,7 +109,7 @@ YawPose robust_closed_form(const std::vector<AlignmentPair>& pairs) {
     for (Eigen::Index k = 0; k < weights.size(); ++k) {
       weights[k] = base[k] * robust_weight(squared_sigmas[static_cast<std::size_t>(k)] / scale);
     }
-    estimate = closed_form(pairs, weights);
+    estimate = closed_form(pairs, weights, heading);
   }
   return estimate;
 }
@@ -273,6 +272,14 @@ double least_share_of(const std::vector<AlignmentPair>& pairs) {
   return std::min(1.0, sum / static_cast<double>(pairs.size()));
 }
 
+Matrix5d information_of(const std::optional<YawPrior>& heading) {
+  Matrix5d information = Matrix5d::Zero();
+  if (heading) {
+    information(0, 0) = 1.0 / (heading->sigma_rad * heading->sigma_rad);
+  }
+  return information;
+}
+
 double outlier_share_of(const RobustWeights& weights) {
   const auto outliers =
       (weights.horizontal.array().min(weights.vertical.array()) < kOutlierWeight).count();
@@ -287,18 +294,23 @@ double AlignmentSolution::yaw_sigma_rad() const {
 
 std::optional<AlignmentSolution> solve_alignment(const std::vector<AlignmentPair>& pairs,
                                                  const AlignmentConfig& config,
-                                                 double scale_sigma) {
+                                                 double scale_sigma,
+                                                 const std::optional<YawPrior>& heading) {
   if (pairs.empty()) {
     return std::nullopt;
   }
   const Covariances covariances = residual_covariances(pairs, config);
-  ScaledPose estimate{robust_closed_form(pairs)};
+  const Matrix5d by_heading = information_of(heading);
+  ScaledPose estimate{robust_closed_form(pairs, heading)};
+  double off_heading_rad = 0.0;
   Linearised system;
   RobustWeights weights;
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
     weights = weigh(pairs, estimate, covariances);
     system = linearise(pairs, estimate, scale_sigma, factorise(covariances, weights));
-    const Vector5d step = system.information.ldlt().solve(system.gradient);
+    off_heading_rad = heading ? wrap_angle(heading->yaw_rad - estimate.T.yaw_rad) : 0.0;
+    const Vector5d gradient = system.gradient + by_heading.col(0) * off_heading_rad;
+    const Vector5d step = (system.information + by_heading).ldlt().solve(gradient);
     estimate = {{wrap_angle(estimate.T.yaw_rad + step[0]), estimate.T.p + step.segment<3>(1)},
                 estimate.scale + step[4]};
     if (!step.allFinite() || step.norm() < kConverged) {
@@ -310,13 +322,15 @@ std::optional<AlignmentSolution> solve_alignment(const std::vector<AlignmentPair
   solution.scale = estimate.scale;
   solution.pairs = pairs.size();
   solution.baseline_m = horizontal_extent(pairs);
-  const double dof = std::max(1.0, 3.0 * static_cast<double>(pairs.size()) - 4.0);
-  solution.chi_square = system.chi_square;
+  const double dof =
+      std::max(1.0, 3.0 * static_cast<double>(pairs.size()) - 4.0 + (heading ? 1.0 : 0.0));
+  solution.chi_square = system.chi_square + by_heading(0, 0) * off_heading_rad * off_heading_rad;
   solution.chi_square_limit =
       config.residual_tolerance * chi_square_quantile(dof, kStandardNormal999);
   solution.outlier_share = outlier_share_of(weights);
-  const Matrix5d covariance = system.information.ldlt().solve(Matrix5d::Identity()) *
-                              variance_factor(system.chi_square, dof, least_share_of(pairs));
+  const double factor = variance_factor(solution.chi_square, dof, least_share_of(pairs));
+  const Matrix5d information = system.information / factor + by_heading;  // not of its own
+  const Matrix5d covariance = information.ldlt().solve(Matrix5d::Identity());
   solution.covariance = covariance.topLeftCorner<4, 4>();
   if (scale_sigma > 0.0) {
     solution.scale_covariance = covariance.col(4);

@@ -38,17 +38,25 @@ struct AlignmentSolution {
   double chi_square_limit{0.0};
   double outlier_share{0.0};
   std::size_t pairs{0};
+  bool contradicts_heading{false};  ///< which was left out therefore
 
   double yaw_sigma_rad() const;
+};
+
+/// What a measured heading says about T_map_odom; its error is not that of the fixes.
+struct YawPrior {
+  double yaw_rad{0.0};
+  double sigma_rad{0.0};
 };
 
 /// Robust generalised least squares (README, "Alignment"); nullopt without pairs or when nothing
 /// finite comes out. Pairs in the order of their stamps. A single pair gives a solution too, with
 /// a yaw sigma that says that yaw is not known. `scale_sigma`: prior of the scale about 1; 0: it is
-/// 1 (a LiDAR measures true distances).
+/// 1 (a LiDAR measures true distances). With a heading the search begins at it.
 std::optional<AlignmentSolution> solve_alignment(const std::vector<AlignmentPair>& pairs,
                                                  const AlignmentConfig& config,
-                                                 double scale_sigma = 0.0);
+                                                 double scale_sigma = 0.0,
+                                                 const std::optional<YawPrior>& heading = {});
 
 /// Why the solution must not be used yet, as a sentence; nullopt when it may.
 std::optional<std::string> find_obstacle(const AlignmentSolution& solution,

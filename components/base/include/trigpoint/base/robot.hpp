@@ -25,10 +25,13 @@ struct RobotConfig {
   std::string points_topic{"points"};
   std::string imu_topic{"imu/data"};
   std::string fix_topic{"gps/fix"};
-  // Optional inputs of gps_odometry; empty: none.
+  // Optional inputs; empty: none.
   std::string twist_topic;
   std::string twist_message{"TwistWithCovarianceStamped"};
   std::string yaw_topic;
+  double yaw_offset_rad{0.0};
+  double yaw_default_sigma_rad{0.35};
+  double yaw_floor_sigma_rad{0.035};
   // Frames that a message may be in; none listed: any.
   std::vector<std::string> imu_frame_ids;
   std::vector<std::string> fix_frame_ids;

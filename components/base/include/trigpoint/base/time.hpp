@@ -22,4 +22,9 @@ inline Nanoseconds from_seconds(double duration_s) {
   return static_cast<Nanoseconds>(std::llround(duration_s * 1e9));
 }
 
+/// Differences of usable stamps fit into 64 bits.
+constexpr bool is_usable_stamp(Nanoseconds stamp_ns) {
+  return stamp_ns >= 0 && stamp_ns < 8'000'000'000 * kNanosecondsPerSecond;
+}
+
 }  // namespace trigpoint

@@ -36,6 +36,8 @@ class FusionGate {
   Output on_gps_odometry(const Odometry& odometry, const std::string& writer);
   Output on_gps_status(const GpsStatus& status, const std::string& writer);
   Output on_fix(const GnssFix& fix);
+  /// A heading of robot.yaw_topic: a prior of the first alignment.
+  Output on_yaw(const YawMeasurement& yaw);
   Output on_datum(const Datum& datum);
   Output on_lio_odometry(const Odometry& odometry);
   Output on_lio_odometry_imu_rate(const Odometry& odometry);

@@ -128,9 +128,6 @@ struct Config {
   double twist_share{0.03};
   Eigen::Vector3d twist_point_base_m{0.0, 0.0, 0.0};
   double yaw_interval_s{0.5};
-  double yaw_offset_rad{0.0};
-  double yaw_default_sigma_rad{0.35};
-  double yaw_floor_sigma_rad{0.035};
 
   Eskf18Config eskf18;
 };
