@@ -4,7 +4,6 @@
 
 #include "trigpoint/bus/bus.hpp"
 #include "trigpoint/bus/loop.hpp"
-#include "trigpoint/recording/rosbag2_writer.hpp"
 
 #include <chrono>
 #include <map>
@@ -26,7 +25,7 @@ std::vector<TopicSummary> summarize(const std::map<std::string, TopicSummary>& c
 
 RecordResult record(const RecordOptions& options) {
   bus::Loop loop;
-  Rosbag2Writer writer(options.out);
+  Rosbag2Writer writer(options.out, options.storage);
   std::map<std::string, TopicSummary> counts;
   bus::Participant participant(options.bus, "recorder", options.on_event);
   std::vector<std::unique_ptr<bus::SerializedSubscription>> subscriptions;
