@@ -81,8 +81,8 @@ class McapFile : public BagFile {
     } else {
       look_through();
     }
-    faults_ = layout_.faults;
-    faults_.insert(faults_.end(), damages_.begin(), damages_.end());
+    faults_ = damages_;
+    faults_.insert(faults_.end(), layout_.faults.begin(), layout_.faults.end());
   }
 
   std::vector<TopicSummary> topics() const override {

@@ -18,9 +18,15 @@ namespace trigpoint::recording {
 
 inline constexpr int kDriveMessages = 120;
 
-/// 100 IMU samples, 10 fixes and clouds, which arrive 50 ms late. With `flush_every` messages a
-/// chunk ends.
-inline void write_drive(Rosbag2Writer& writer, int flush_every = 0, std::uint32_t points = 100) {
+/// What the drive is made of: for every tenth IMU sample there is a fix and a cloud, which arrive
+/// 50 ms late.
+struct DriveSize {
+  int imu_samples{100};
+  std::uint32_t points{100};  ///< of a cloud
+};
+
+/// With `flush_every` messages a chunk ends.
+inline void write_drive(Rosbag2Writer& writer, int flush_every = 0, const DriveSize& size = {}) {
   int count = 0;
   const auto write = [&](const char* topic, Nanoseconds receive_ns, const auto& message) {
     writer.write(topic, receive_ns, message);
@@ -28,13 +34,13 @@ inline void write_drive(Rosbag2Writer& writer, int flush_every = 0, std::uint32_
       writer.flush();
     }
   };
-  for (int i = 0; i < 100; ++i) {
+  for (int i = 0; i < size.imu_samples; ++i) {
     const auto imu = sample_imu(i);
     write("imu/data", imu.stamp_ns, imu);
     if (i % 10 == 5) {
       const auto fix = sample_fix(i / 10);
       write("gps/fix", fix.stamp_ns + 50 * kMillisecond_ns, fix);
-      const auto cloud = sample_cloud(i / 10, points);
+      const auto cloud = sample_cloud(i / 10, size.points);
       write("/points", cloud.stamp_ns + 50 * kMillisecond_ns, cloud);
     }
   }
@@ -47,9 +53,10 @@ inline std::string text_of(const LogEntry& entry) {
   text << entry.receive_ns << ' ';
   if (const auto* imu = std::get_if<ImuSample>(&entry.measurement)) {
     text << "imu " << imu->stamp_ns << ' ' << imu->frame_id << ' ' << imu->gyro_radps.transpose()
-         << ' ' << imu->accel_mps2.transpose() << ' '
-         << (imu->q_world_base ? imu->q_world_base->coeffs().transpose()
-                               : Eigen::RowVector4d::Zero());
+         << ' ' << imu->accel_mps2.transpose() << ' ';
+    if (imu->q_world_base) {
+      text << imu->q_world_base->coeffs().transpose();
+    }
   } else if (const auto* fix = std::get_if<GnssFix>(&entry.measurement)) {
     text << "fix " << fix->stamp_ns << ' ' << fix->frame_id << ' ' << static_cast<int>(fix->status)
          << ' ' << fix->service << ' ' << fix->latitude_deg << ' ' << fix->longitude_deg << ' '
@@ -68,15 +75,15 @@ inline std::string text_of(const LogEntry& entry) {
 }
 
 /// The drive as a reader must deliver it.
-inline std::vector<std::string> drive_in_order(std::uint32_t points = 100) {
+inline std::vector<std::string> drive_in_order(const DriveSize& size = {}) {
   std::vector<LogEntry> entries;
-  for (int i = 0; i < 100; ++i) {
+  for (int i = 0; i < size.imu_samples; ++i) {
     entries.push_back({sample_imu(i).stamp_ns, sample_imu(i), false});
     if (i % 10 == 5) {
       const Nanoseconds late_ns = 50 * kMillisecond_ns;
       const auto fix = sample_fix(i / 10);
       entries.push_back({fix.stamp_ns + late_ns, fix, false});
-      const auto cloud = sample_cloud(i / 10, points);
+      const auto cloud = sample_cloud(i / 10, size.points);
       entries.push_back({cloud.stamp_ns + late_ns, cloud, false});
     }
   }
