@@ -21,6 +21,12 @@ std::vector<TopicSummary> summarize(const std::map<std::string, TopicSummary>& c
   return topics;
 }
 
+/// So that what was latched is latched again when the recording is played.
+Durability durability_of(const bus::Qos& qos) {
+  return qos.durability == bus::Durability::kTransientLocal ? Durability::kTransientLocal
+                                                            : Durability::kVolatile;
+}
+
 }  // namespace
 
 RecordResult record(const RecordOptions& options) {
@@ -43,8 +49,11 @@ RecordResult record(const RecordOptions& options) {
                topic,
                bytes = std::move(cdr),
                received_ns = info.reception_stamp_ns] {
-                writer.write_cdr(topic.name, topic.ros_type, received_ns, bytes);
                 TopicSummary& summary = counts[topic.name];
+                if (summary.messages == 0) {
+                  writer.declare_topic(topic.name, topic.ros_type, durability_of(topic.qos));
+                }
+                writer.write_cdr(topic.name, topic.ros_type, received_ns, bytes);
                 summary.topic = topic.name;
                 summary.type = topic.ros_type;
                 ++summary.messages;
