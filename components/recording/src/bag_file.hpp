@@ -17,8 +17,8 @@ class BagFile {
   virtual ~BagFile() = default;
 
   virtual std::vector<TopicSummary> topics() const = 0;
-  /// 0 when there are no messages.
-  virtual Nanoseconds first_ns() const = 0;
+  /// nullopt when there are no messages.
+  virtual std::optional<Nanoseconds> first_ns() const = 0;
   virtual Nanoseconds last_ns() const = 0;
   /// What is known to be wrong, in sentences.
   virtual std::vector<std::string> faults() const = 0;

@@ -57,7 +57,7 @@ class Db3 : public BagFile {
     return topics;
   }
 
-  Nanoseconds first_ns() const override { return first_ns_; }
+  std::optional<Nanoseconds> first_ns() const override { return first_ns_; }
 
   Nanoseconds last_ns() const override { return last_ns_; }
 
@@ -145,13 +145,14 @@ class Db3 : public BagFile {
     if (topic == topics_.end()) {
       return;
     }
-    first_ns_ = first_ns_ == 0 ? time_ns : std::min(first_ns_, time_ns);
+    first_ns_ = std::min(first_ns_.value_or(time_ns), time_ns);
     last_ns_ = std::max(last_ns_, time_ns);
     ++topic->second.messages;
   }
 
   void count_salvaged() {
-    first_ns_ = last_ns_ = 0;
+    first_ns_.reset();
+    last_ns_ = 0;
     for (const SalvagedRow& row : salvage_->rows()) {
       count(row.topic_id, row.timestamp_ns);
     }
@@ -199,7 +200,7 @@ class Db3 : public BagFile {
   std::pair<std::int64_t, std::int64_t> at_{0, 0};  ///< time and id of the newest row from SQLite
   std::unique_ptr<SqliteSalvage> salvage_;          ///< in its place from where it failed
   std::size_t next_salvaged_{0};
-  Nanoseconds first_ns_{0};
+  std::optional<Nanoseconds> first_ns_;
   Nanoseconds last_ns_{0};
 };
 

@@ -76,7 +76,9 @@ class McapFile : public BagFile {
     damages_ = layout_.damages;
     if (summary_tells_all()) {
       counts_ = layout_.statistics->channel_messages;
-      first_ns_ = layout_.statistics->first_ns;
+      if (layout_.statistics->messages > 0) {
+        first_ns_ = layout_.statistics->first_ns;
+      }
       last_ns_ = layout_.statistics->last_ns;
     } else {
       look_through();
@@ -101,7 +103,7 @@ class McapFile : public BagFile {
     return list;
   }
 
-  Nanoseconds first_ns() const override { return first_ns_; }
+  std::optional<Nanoseconds> first_ns() const override { return first_ns_; }
 
   Nanoseconds last_ns() const override { return last_ns_; }
 
@@ -194,7 +196,7 @@ class McapFile : public BagFile {
         any = true;
       }
       if (any) {
-        first_ns_ = first_ns_ == 0 ? block.first_ns : std::min(first_ns_, block.first_ns);
+        first_ns_ = std::min(first_ns_.value_or(block.first_ns), block.first_ns);
         last_ns_ = std::max(last_ns_, block.last_ns);
         readable.push_back(block);
       }
@@ -405,7 +407,7 @@ class McapFile : public BagFile {
   std::vector<std::string> damages_;
   std::vector<std::string> faults_;
   std::map<std::uint16_t, std::uint64_t> counts_;  ///< messages by channel
-  Nanoseconds first_ns_{0};
+  std::optional<Nanoseconds> first_ns_;
   Nanoseconds last_ns_{0};
   std::set<std::uint16_t> selected_;
   std::vector<std::size_t> order_;  ///< blocks by their first message

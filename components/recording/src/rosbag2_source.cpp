@@ -150,17 +150,18 @@ class Rosbag2Source : public BagSource {
     summary_.path = path.string();
     summary_.format = fs::is_regular_file(path) && is_mcap(path) ? "mcap" : "rosbag2";
     std::map<std::string, TopicSummary> topics;
+    std::optional<Nanoseconds> first_ns;
     for (const auto& file : files_) {
       for (const TopicSummary& topic : file->topics()) {
         auto& sum = topics[topic.topic];
         sum = {topic.topic, topic.type, sum.messages + topic.messages};
       }
-      if (file->first_ns() != 0) {
-        summary_.first_ns = summary_.first_ns == 0 ? file->first_ns()
-                                                   : std::min(summary_.first_ns, file->first_ns());
+      if (const auto begin_ns = file->first_ns()) {
+        first_ns = std::min(first_ns.value_or(*begin_ns), *begin_ns);
         summary_.last_ns = std::max(summary_.last_ns, file->last_ns());
       }
     }
+    summary_.first_ns = first_ns.value_or(0);
     for (const auto& [name, topic] : topics) {
       summary_.topics.push_back(topic);
     }

@@ -113,6 +113,23 @@ TEST(Mcap, several_files_of_a_bag_are_one_log_in_order_also_where_they_overlap) 
   EXPECT_EQ(20U, read_all(*open_log(bag.string(), RobotConfig{}, only_imu())).size());
 }
 
+/// A recorder that has no clock yet writes zero.
+TEST(Mcap, a_message_of_time_zero_hides_no_other_in_either_storage) {
+  TemporaryFolder folder;
+  for (const Storage storage : {Storage::kMcap, Storage::kSqlite3}) {
+    const auto path = folder / (storage == Storage::kMcap ? "mcap" : "sqlite3");
+    {
+      Rosbag2Writer writer(path.string(), storage);
+      writer.write("imu/data", 0, sample_imu(-1));
+      write_drive(writer);
+    }
+    EXPECT_EQ(121U, hear(path).entries.size()) << path;
+    const auto log = open_log(path.string(), RobotConfig{});
+    EXPECT_EQ(0, log->summary().first_ns);
+    EXPECT_EQ(sample_imu(99).stamp_ns, log->summary().last_ns);
+  }
+}
+
 TEST(Mcap, is_known_by_its_first_bytes_whatever_it_is_called) {
   TemporaryFolder folder;
   {
