@@ -75,11 +75,7 @@ class McapFile : public BagFile {
     layout_ = mcap::scan(file_);
     damages_ = layout_.damages;
     if (summary_tells_all()) {
-      counts_ = layout_.statistics->channel_messages;
-      if (layout_.statistics->messages > 0) {
-        first_ns_ = layout_.statistics->first_ns;
-      }
-      last_ns_ = layout_.statistics->last_ns;
+      take_summary(*layout_.statistics);
     } else {
       look_through();
     }
@@ -171,6 +167,21 @@ class McapFile : public BagFile {
     }
     return sum == statistics->messages &&
            std::all_of(layout_.channels.begin(), layout_.channels.end(), has_schema);
+  }
+
+  /// The blocks may widen the span of time, so that statistics that lie hide no message.
+  void take_summary(const mcap::Statistics& statistics) {
+    counts_ = statistics.channel_messages;
+    if (statistics.messages == 0) {
+      return;
+    }
+    first_ns_ = statistics.first_ns;
+    last_ns_ = statistics.last_ns;
+    for (const Block& block : layout_.blocks) {
+      const bool empty = block.first_ns == 0 && block.last_ns == 0;
+      first_ns_ = empty ? *first_ns_ : std::min(*first_ns_, block.first_ns);
+      last_ns_ = std::max(last_ns_, block.last_ns);
+    }
   }
 
   const mcap::Schema& schema_of(const mcap::Channel& channel) const {

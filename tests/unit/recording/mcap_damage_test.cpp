@@ -200,6 +200,24 @@ TEST(McapDamage, a_summary_whose_crc_does_not_fit_is_not_believed_and_all_is_rea
                   HasSubstr("CRC does not fit"))));
 }
 
+TEST(McapDamage, statistics_that_end_too_early_hide_no_message) {
+  TemporaryFolder folder;
+  std::string bytes = drive_bytes(folder / "a.mcap", 30);
+  const Bytes view(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
+  const auto footer = mcap::parse_footer(view.last(mcap::kFooterBytes + mcap::kMagic.size()));
+  Bytes rest = view.subspan(footer->summary_begin);
+  auto record = mcap::take_record(rest);
+  while (record->first.op != mcap::Op::kStatistics) {
+    record = mcap::take_record(rest);
+  }
+  constexpr std::size_t kLastTime = 8 + 2 + 4 * 4 + 8;  // after the counts and the first time
+  const auto at = static_cast<std::size_t>(record->second.data() - view.data()) + kLastTime;
+  bytes.replace(at, 8, bytes.substr(at - 8, 8));                      // ends when it begins
+  bytes.replace(bytes.size() - mcap::kMagic.size() - 4, 4, 4, '\0');  // no CRC
+  write_bytes(folder / "a.mcap", bytes);
+  EXPECT_TRUE(hear(folder / "a.mcap").entries == drive_in_order());
+}
+
 /// More than what reading a small file needs, far less than what the lies below ask for.
 constexpr long kMemory_kb = 100'000;
 
