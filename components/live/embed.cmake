@@ -1,5 +1,5 @@
-# cmake -DOUTPUT=... -DPAGE_FOLDER=... -DIDL_FOLDER=... -P embed.cmake
-# Writes embedded.cpp: index.html with the scripts that it names put in place, and all of the IDL.
+# cmake -DOUTPUT=... -DPAGE_FOLDER=... -P embed.cmake
+# Writes embedded.cpp: index.html with the scripts that it names put in place.
 file(READ "${PAGE_FOLDER}/index.html" page)
 file(GLOB scripts "${PAGE_FOLDER}/*.js")
 foreach(script ${scripts})
@@ -10,21 +10,11 @@ endforeach()
 if(page MATCHES "<script src=")
   message(FATAL_ERROR "index.html names a script that is not beside it")
 endif()
-file(GLOB idl_files "${IDL_FOLDER}/*.idl")
-set(idl "")
-foreach(idl_file ${idl_files})
-  file(READ "${idl_file}" text)
-  string(APPEND idl "${text}")
-endforeach()
 file(WRITE "${OUTPUT}"
 "// Written by embed.cmake.
 #include \"embedded.hpp\"
 
 namespace trigpoint::live {
-
-std::string_view embedded_idl() {
-  return R\"embedded~(${idl})embedded~\";
-}
 
 std::string_view embedded_page() {
   return R\"embedded~(${page})embedded~\";

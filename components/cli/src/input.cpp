@@ -226,11 +226,12 @@ void add_config_options(CLI::App& verb, InputOptions& options) {
 }
 
 void add_input_options(CLI::App& verb, InputOptions& options) {
-  verb.add_option("LOG",
-                  options.log,
-                  "ROS 1 bag, rosbag2 folder, KITTI raw drive folder, folder made by trigpoint "
-                  "simulate, or a scenario (name or .yaml), which is streamed; "
-                  "SCENARIO+CHANGE+... alters it (see trigpoint simulate --help)")
+  verb.add_option(
+          "LOG",
+          options.log,
+          "ROS 1 bag, rosbag2 folder, MCAP file, KITTI raw drive folder, folder made by trigpoint "
+          "simulate, or a scenario (name or .yaml), which is streamed; "
+          "SCENARIO+CHANGE+... alters it (see trigpoint simulate --help)")
       ->required();
   add_config_options(verb, options);
   verb.add_option(
@@ -250,6 +251,16 @@ void add_scenario_options(CLI::App& verb, ScenarioChanges& changes) {
                   changes.day,
                   "of a scenario: the same world (with the same seed), other noise, later stamps")
       ->check(whole_number());
+}
+
+void add_storage_option(CLI::App& verb, std::optional<recording::Storage>& storage) {
+  verb.add_option_function<std::string>(
+          "--storage",
+          [&storage](const std::string& name) {
+            storage = name == "mcap" ? recording::Storage::kMcap : recording::Storage::kSqlite3;
+          },
+          "of the rosbag2: sqlite3 (default) or mcap")
+      ->check(CLI::IsMember({"sqlite3", "mcap"}));
 }
 
 std::string with_changes(const std::string& scenario, const ScenarioChanges& changes) {

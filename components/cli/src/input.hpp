@@ -3,6 +3,7 @@
 #pragma once
 
 #include "trigpoint/recording/log.hpp"
+#include "trigpoint/recording/rosbag2_writer.hpp"
 
 #include "system_config.hpp"
 #include "verbs.hpp"
@@ -25,7 +26,7 @@ struct ScenarioChanges {
 };
 
 struct InputOptions {
-  std::string log;  ///< bag, rosbag2, KITTI drive, simulated drive's folder, or scenario
+  std::string log;  ///< bag, rosbag2, MCAP, KITTI drive, simulated drive's folder, or scenario
   std::vector<std::string> config_files;
   std::string mode;                   ///< of the gate; empty: the configuration's
   std::optional<std::uint64_t> seed;  ///< of a scenario; 1 when left out
@@ -43,6 +44,9 @@ struct Input {
 
 /// The arguments --beams, --start and --day.
 void add_scenario_options(CLI::App& verb, ScenarioChanges& changes);
+
+/// The argument --storage, of what writes a rosbag2.
+void add_storage_option(CLI::App& verb, std::optional<recording::Storage>& storage);
 
 /// The scenario with the changes behind a plus, as load_scenario takes it.
 std::string with_changes(const std::string& scenario, const ScenarioChanges& changes);

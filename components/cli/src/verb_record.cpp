@@ -16,6 +16,7 @@
 #include <iostream>
 #include <memory>
 #include <numeric>
+#include <optional>
 
 namespace trigpoint::cli {
 
@@ -26,6 +27,7 @@ struct RecordVerbOptions {
   std::string out;
   std::vector<std::string> topics;
   double duration_s{0.0};
+  std::optional<recording::Storage> storage;
 };
 
 /// All topics, or those that the user named. Throws ConfigError for a name that nobody publishes.
@@ -62,6 +64,9 @@ namespace fs = std::filesystem;
 
 void require_empty_or_new(const std::string& out) {
   std::error_code error;
+  if (recording::names_mcap_file(out) && fs::exists(out)) {
+    throw ConfigError("--out: " + out + " exists; a recording is never written over another");
+  }
   if (fs::exists(out) && (!fs::is_directory(out) || !fs::is_empty(out, error))) {
     throw ConfigError("--out: " + out +
                       " exists and is not an empty folder; a recording is never written over "
@@ -69,7 +74,7 @@ void require_empty_or_new(const std::string& out) {
   }
 }
 
-/// An empty bag is of no use; a folder that was there before stays.
+/// An empty recording is of no use; a folder that was there before stays.
 void remove_bag(const std::string& out, bool was_there) {
   std::error_code error;
   if (!was_there) {
@@ -83,6 +88,10 @@ void remove_bag(const std::string& out, bool was_there) {
 
 int run(const RecordVerbOptions& options) {
   require_empty_or_new(options.out);
+  if (recording::names_mcap_file(options.out) && options.storage == recording::Storage::kSqlite3) {
+    throw ConfigError("--storage sqlite3: " + options.out +
+                      " names an MCAP file; name a folder, or leave --storage out");
+  }
   const bool was_there = fs::exists(options.out);
   const shell::EventLog log("record");
   const SystemConfig config = load_config_of(options.input);
@@ -90,6 +99,7 @@ int run(const RecordVerbOptions& options) {
   record.bus = config.bus;
   record.topics = choose(recording::known_topics(config.cores.robot), options.topics);
   record.out = options.out;
+  record.storage = options.storage.value_or(recording::Storage::kSqlite3);
   record.duration_s = options.duration_s;
   record.on_event = [&log](const Event& event) { log(event); };
   record.progress = [terminal = isatty(STDERR_FILENO) == 1](const auto& topics) {
@@ -128,10 +138,13 @@ int run(const RecordVerbOptions& options) {
 }  // namespace
 
 void add_record(CLI::App& app, Chosen& chosen) {
-  CLI::App* verb =
-      app.add_subcommand("record", "Write what is on the bus into a rosbag2, until Ctrl-C");
+  CLI::App* verb = app.add_subcommand(
+      "record", "Write what is on the bus into a rosbag2 or an MCAP file, until Ctrl-C");
   const auto options = std::make_shared<RecordVerbOptions>();
-  verb->add_option("--out", options->out, "folder of the bag; new or empty")->required();
+  verb->add_option(
+          "--out", options->out, "folder of the bag, new or empty; FILE.mcap: that file alone")
+      ->required();
+  add_storage_option(*verb, options->storage);
   verb->add_option("--config", options->input.config_files, "YAML with the keys to change");
   verb->add_option("--topic", options->topics, "only this topic; may be repeated");
   verb->add_option("--duration", options->duration_s, "stop by itself after this time, s")

@@ -26,6 +26,7 @@ struct SimulateOptions {
   std::string out;
   bool no_lidar{false};
   ScenarioChanges changes;
+  std::optional<recording::Storage> storage;
 };
 
 /// Thrown out of the simulation between two messages: the log is closed on the way.
@@ -43,8 +44,13 @@ void simulate(const SimulateOptions& options,
     progress(share);
   };
   try {
-    simulator::simulate(
-        scenario, options.seed, duration_s, options.out, tell_or_stop, {!options.no_lidar, {}});
+    simulator::simulate(scenario,
+                        options.seed,
+                        duration_s,
+                        options.out,
+                        tell_or_stop,
+                        {!options.no_lidar, {}},
+                        options.storage.value_or(recording::Storage::kSqlite3));
   } catch (const std::exception&) {
     std::error_code not_empty;
     std::filesystem::remove(options.out, not_empty);  // leaves whatever is in it
@@ -66,7 +72,9 @@ int run(const SimulateOptions& options) {
               << "/log is whole up to there and can be used\n";
     return kInterrupted;
   }
-  std::cout << options.out << ": log (rosbag2), truth.tum, scenario.yaml, robot.yaml\n"
+  std::cout << options.out << ": log (rosbag2, "
+            << (options.storage == recording::Storage::kMcap ? "mcap" : "sqlite3")
+            << "), truth.tum, scenario.yaml, robot.yaml\n"
             << "next: trigpoint map " << options.out << " --out SESSION\n";
   return 0;
 }
@@ -93,6 +101,7 @@ void add_simulate(CLI::App& app, Chosen& chosen) {
       ->check(more_than_zero());
   verb->add_option("--out", options->out, "folder, created when missing; must not hold results yet")
       ->required();
+  add_storage_option(*verb, options->storage);
   verb->add_flag("--no-lidar", options->no_lidar, "IMU and GPS only, at a hundred times real time");
   verb->callback([options, &chosen] { chosen = [options] { return run(*options); }; });
 }

@@ -7,7 +7,6 @@
 
 namespace trigpoint::live {
 
-std::string_view embedded_idl();   ///< all of idl/, one after another
 std::string_view embedded_page();  ///< page/index.html with its scripts in it
 
 }  // namespace trigpoint::live

@@ -2,7 +2,8 @@
 // Copyright the Trigpoint developers
 #include "protocol.hpp"
 
-#include "message_definition.hpp"
+#include "trigpoint/bus/message_definition.hpp"
+
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
@@ -129,7 +130,7 @@ std::string advertise_json(const std::vector<Channel>& channels) {
                     {"topic", channels[id].topic},
                     {"encoding", "cdr"},
                     {"schemaName", channels[id].schema_name},
-                    {"schema", message_definition(channels[id].schema_name)},
+                    {"schema", bus::message_definition(channels[id].schema_name)},
                     {"schemaEncoding", "ros2msg"}});
   }
   return json{{"op", "advertise"}, {"channels", std::move(list)}}.dump();

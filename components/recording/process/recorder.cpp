@@ -4,7 +4,6 @@
 
 #include "trigpoint/bus/bus.hpp"
 #include "trigpoint/bus/loop.hpp"
-#include "trigpoint/recording/rosbag2_writer.hpp"
 
 #include <chrono>
 #include <map>
@@ -22,11 +21,17 @@ std::vector<TopicSummary> summarize(const std::map<std::string, TopicSummary>& c
   return topics;
 }
 
+/// So that what was latched is latched again when the recording is played.
+Durability durability_of(const bus::Qos& qos) {
+  return qos.durability == bus::Durability::kTransientLocal ? Durability::kTransientLocal
+                                                            : Durability::kVolatile;
+}
+
 }  // namespace
 
 RecordResult record(const RecordOptions& options) {
   bus::Loop loop;
-  Rosbag2Writer writer(options.out);
+  Rosbag2Writer writer(options.out, options.storage);
   std::map<std::string, TopicSummary> counts;
   bus::Participant participant(options.bus, "recorder", options.on_event);
   std::vector<std::unique_ptr<bus::SerializedSubscription>> subscriptions;
@@ -44,8 +49,11 @@ RecordResult record(const RecordOptions& options) {
                topic,
                bytes = std::move(cdr),
                received_ns = info.reception_stamp_ns] {
-                writer.write_cdr(topic.name, topic.ros_type, received_ns, bytes);
                 TopicSummary& summary = counts[topic.name];
+                if (summary.messages == 0) {
+                  writer.declare_topic(topic.name, topic.ros_type, durability_of(topic.qos));
+                }
+                writer.write_cdr(topic.name, topic.ros_type, received_ns, bytes);
                 summary.topic = topic.name;
                 summary.type = topic.ros_type;
                 ++summary.messages;

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
-// Writes what is on the bus into a rosbag2.
+// Writes what is on the bus into a rosbag2 or an MCAP file.
 #pragma once
 
 #include "trigpoint/base/event.hpp"
 #include "trigpoint/bus/config.hpp"
 #include "trigpoint/recording/log.hpp"
+#include "trigpoint/recording/rosbag2_writer.hpp"
 
 #include "known_topics.hpp"
 
@@ -19,7 +20,8 @@ namespace trigpoint::recording {
 struct RecordOptions {
   bus::Config bus;
   std::vector<KnownTopic> topics;
-  std::string out;                             ///< folder of the bag; must not exist
+  std::string out;  ///< folder of the bag, or a .mcap file; must not exist
+  Storage storage{Storage::kSqlite3};
   double duration_s{0.0};                      ///< wall time; 0: until a signal
   std::function<void(const Event&)> on_event;  ///< may be empty
   /// Called about once a second with what has been written so far; may be empty.

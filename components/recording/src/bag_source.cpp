@@ -50,7 +50,7 @@ class BagReader : public LogReader {
   std::optional<std::string> truth_file() const override {
     const auto folder = std::filesystem::absolute(summary().path).lexically_normal();
     auto beside = folder.has_filename() ? folder.parent_path() : folder.parent_path().parent_path();
-    if (folder.extension() == ".db3") {
+    if (folder.extension() == ".db3" || folder.extension() == ".mcap") {
       beside = beside.parent_path();
     }
     const auto file = beside / "truth.tum";

@@ -6,6 +6,7 @@
 #include "kitti_drive.hpp"
 #include "kitti_reader.hpp"
 #include "log_window.hpp"
+#include "mcap_file.hpp"
 #include "rosbag1_source.hpp"
 #include "rosbag2_source.hpp"
 
@@ -30,6 +31,11 @@ bool is_rosbag1(const fs::path& path) {
 
 /// A hint for files that lie near a log.
 std::string hint_for(const fs::path& path) {
+  const fs::path inner = path.stem().extension();
+  if (path.extension() == ".zstd" && (inner == ".db3" || inner == ".mcap")) {
+    return "; rosbag2 has compressed the file: `zstd -d " + path.filename().string() + " -o " +
+           path.stem().string() + "` makes one of it that can be read";
+  }
   if (path.filename() == "metadata.yaml") {
     return "; it describes a rosbag2: name the folder that it lies in";
   }
@@ -42,7 +48,7 @@ std::unique_ptr<LogReader> open_by_kind(const fs::path& path,
   if (fs::is_regular_file(path) && is_rosbag1(path)) {
     return read_bag(open_rosbag1(path), robot, options);
   }
-  if (fs::is_directory(path) || path.extension() == ".db3") {
+  if (fs::is_directory(path) || path.extension() == ".db3" || is_mcap(path)) {
     if (const auto files = find_rosbag2_files(path); !files.empty()) {
       return read_bag(open_rosbag2(path, files), robot, options);
     }
@@ -51,8 +57,9 @@ std::unique_ptr<LogReader> open_by_kind(const fs::path& path,
     return open_kitti_drive(*sync_folder, robot, options);
   }
   throw LogError(path.string() +
-                 ": is no log that is known here; expected a ROS 1 bag (.bag), a rosbag2 folder "
-                 "(metadata.yaml, .db3) or a .db3 of one, a KITTI raw drive (velodyne_points, "
+                 ": is no log that is known here; expected a ROS 1 bag (.bag), an MCAP file "
+                 "(.mcap), a rosbag2 folder (metadata.yaml; .db3 or .mcap) or a .db3 of one, a "
+                 "KITTI raw drive (velodyne_points, "
                  "oxts), a folder made by trigpoint simulate, or a scenario" +
                  hint_for(path));
 }

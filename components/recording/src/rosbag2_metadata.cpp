@@ -42,25 +42,8 @@ void emit_file(YAML::Emitter& out, const Rosbag2Metadata& metadata, const std::s
   out << YAML::Key << "message_count" << YAML::Value << total(metadata.topics) << YAML::EndMap;
 }
 
-}  // namespace
-
-Rosbag2Metadata read_metadata(const std::filesystem::path& file) {
-  try {
-    const YAML::Node node = YAML::LoadFile(file.string())["rosbag2_bagfile_information"];
-    Rosbag2Metadata metadata;
-    metadata.storage = node["storage_identifier"].as<std::string>();
-    metadata.compression_format = node["compression_format"].as<std::string>("");
-    metadata.files = node["relative_file_paths"].as<std::vector<std::string>>();
-    return metadata;
-  } catch (const YAML::Exception& error) {
-    throw LogError(file.string() + ": is no metadata of rosbag2: " + error.what());
-  }
-}
-
-std::string to_yaml(const Rosbag2Metadata& metadata) {
-  YAML::Emitter out;
-  out << YAML::BeginMap << YAML::Key << "rosbag2_bagfile_information" << YAML::Value
-      << YAML::BeginMap;
+void emit(YAML::Emitter& out, const Rosbag2Metadata& metadata) {
+  out << YAML::BeginMap;
   out << YAML::Key << "version" << YAML::Value << 5;
   out << YAML::Key << "storage_identifier" << YAML::Value << metadata.storage;
   emit_times(out, metadata);
@@ -78,7 +61,35 @@ std::string to_yaml(const Rosbag2Metadata& metadata) {
   for (const auto& file : metadata.files) {
     emit_file(out, metadata, file);
   }
-  out << YAML::EndSeq << YAML::EndMap << YAML::EndMap;
+  out << YAML::EndSeq << YAML::EndMap;
+}
+
+}  // namespace
+
+Rosbag2Metadata read_metadata(const std::filesystem::path& file) {
+  try {
+    const YAML::Node node = YAML::LoadFile(file.string())["rosbag2_bagfile_information"];
+    Rosbag2Metadata metadata;
+    metadata.storage = node["storage_identifier"].as<std::string>();
+    metadata.compression_format = node["compression_format"].as<std::string>("");
+    metadata.files = node["relative_file_paths"].as<std::vector<std::string>>();
+    return metadata;
+  } catch (const YAML::Exception& error) {
+    throw LogError(file.string() + ": is no metadata of rosbag2: " + error.what());
+  }
+}
+
+std::string to_yaml(const Rosbag2Metadata& metadata) {
+  YAML::Emitter out;
+  out << YAML::BeginMap << YAML::Key << "rosbag2_bagfile_information" << YAML::Value;
+  emit(out, metadata);
+  out << YAML::EndMap;
+  return std::string(out.c_str()) + "\n";
+}
+
+std::string to_bare_yaml(const Rosbag2Metadata& metadata) {
+  YAML::Emitter out;
+  emit(out, metadata);
   return std::string(out.c_str()) + "\n";
 }
 

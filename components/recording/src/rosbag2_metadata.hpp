@@ -33,6 +33,9 @@ Rosbag2Metadata read_metadata(const std::filesystem::path& file);
 
 std::string to_yaml(const Rosbag2Metadata& metadata);
 
+/// Without the key in front of all, as rosbag2 puts it into an MCAP file.
+std::string to_bare_yaml(const Rosbag2Metadata& metadata);
+
 /// One writer's QoS as rosbag2 Humble stores it: reliable, keep last 10.
 std::string offered_qos(Durability durability);
 

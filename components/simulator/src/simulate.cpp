@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
-#include "trigpoint/recording/rosbag2_writer.hpp"
 #include "trigpoint/simulator/simulator.hpp"
 
 #include <filesystem>
@@ -42,9 +41,12 @@ const std::string& topic_of(const recording::Measurement& measurement, const Rob
   return std::holds_alternative<GnssFix>(measurement) ? robot.fix_topic : robot.points_topic;
 }
 
-void write_log(ScenarioReader& reader, const std::string& folder, const Progress& progress) {
+void write_log(ScenarioReader& reader,
+               const std::string& folder,
+               recording::Storage storage,
+               const Progress& progress) {
   const RobotConfig robot = reader.scenario().robot;
-  recording::Rosbag2Writer writer(folder);
+  recording::Rosbag2Writer writer(folder, storage);
   while (const auto entry = reader.next()) {
     std::visit(
         [&](const auto& message) {
@@ -65,7 +67,8 @@ void simulate(const Scenario& scenario,
               std::optional<double> duration_s,
               const std::string& out_dir,
               const Progress& progress,
-              const StreamOptions& options) {
+              const StreamOptions& options,
+              recording::Storage storage) {
   const fs::path out(out_dir);
   std::error_code error;
   fs::create_directories(out, error);
@@ -83,7 +86,7 @@ void simulate(const Scenario& scenario,
   write_text(out / "scenario.yaml", made + scenario.source_yaml);
   write_text(out / "robot.yaml", robot_overlay(scenario.robot));
   reader->write_truth((out / "truth.tum").string());
-  write_log(*reader, (out / "log").string(), progress);
+  write_log(*reader, (out / "log").string(), storage, progress);
 }
 
 }  // namespace trigpoint::simulator

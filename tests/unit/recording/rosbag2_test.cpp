@@ -194,7 +194,7 @@ TEST(Rosbag2, a_full_disk_is_told_and_keeps_what_was_written) {
   TemporaryFolder folder;
   const auto path = (folder / "log").string();
   constexpr std::uint64_t kLimit_bytes = 300'000;
-  Rosbag2Writer writer(path, kLimit_bytes);
+  Rosbag2Writer writer(path, Storage::kSqlite3, kLimit_bytes);
   const auto told = message_of<LogError>([&] {
     for (int i = 0; i < 1000; ++i) {
       writer.write("points", kStart_ns + i * 100 * kMillisecond_ns, sample_cloud(i, 1000));
@@ -219,7 +219,7 @@ TEST(Rosbag2, a_full_disk_is_told_and_keeps_what_was_written) {
 TEST(Rosbag2, a_full_disk_within_a_transaction_counts_only_what_is_durable) {
   TemporaryFolder folder;
   const auto path = (folder / "log").string();
-  Rosbag2Writer writer(path, 300'000);
+  Rosbag2Writer writer(path, Storage::kSqlite3, 300'000);
   EXPECT_THROW(
       {
         for (int i = 0; i < 1000; ++i) {
@@ -418,10 +418,10 @@ TEST(Rosbag2, reads_a_bag_of_several_files_in_their_order) {
 TEST(Rosbag2, names_what_it_cannot_read) {
   TemporaryFolder folder;
   std::ofstream(folder / "metadata.yaml")
-      << "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: mcap\n  "
-         "relative_file_paths: [a.mcap]\n";
+      << "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: tape\n  "
+         "relative_file_paths: [a.tape]\n";
   EXPECT_THAT(message_of<LogError>([&] { open_log(folder.path().string(), RobotConfig{}); }),
-              HasSubstr("mcap"));
+              HasSubstr("storage 'tape'"));
   std::ofstream(folder / "text.db3")
       << "this is no database at all, but long enough to look like a file";
   EXPECT_THAT(

@@ -41,7 +41,7 @@ struct TopicSummary {
 
 struct LogSummary {
   std::string path;
-  std::string format;  ///< "rosbag1", "rosbag2", "kitti", "scenario"
+  std::string format;  ///< "rosbag1", "rosbag2", "mcap", "kitti", "scenario"
   Nanoseconds first_ns{0};
   Nanoseconds last_ns{0};
   std::vector<TopicSummary> topics;
@@ -105,9 +105,9 @@ struct LogOptions {
   double elevation_correction_rad{0.0};
 };
 
-/// Opens a ROS 1 bag (known by its first line), a rosbag2 folder or .db3 file, or a KITTI raw drive
-/// folder. Throws LogError when the path does not exist, is empty, is of no known kind, or lacks a
-/// mapped topic (naming it, what is there instead, and the nearest name).
+/// Opens a ROS 1 bag or an MCAP file (known by their first bytes), a rosbag2 folder or .db3 file,
+/// or a KITTI raw drive folder. Throws LogError when the path does not exist, is empty, is of no
+/// known kind, or lacks a mapped topic (naming it, what is there instead, and the nearest name).
 std::unique_ptr<LogReader> open_log(const std::string& path, const RobotConfig& robot);
 std::unique_ptr<LogReader> open_log(const std::string& path,
                                     const RobotConfig& robot,

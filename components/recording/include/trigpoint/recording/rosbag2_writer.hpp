@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
-// Records what `ros2 bag` (Humble and later) and Foxglove open.
+// Records what `ros2 bag` (Humble and later) and Foxglove open: rosbag2 (sqlite3 or MCAP), or one
+// MCAP file.
 #pragma once
 
 #include "trigpoint/base/measurements.hpp"
@@ -17,15 +18,23 @@ namespace trigpoint::recording {
 /// What a topic's metadata says of its writer.
 enum class Durability { kVolatile, kTransientLocal };
 
-/// Writes a rosbag2 folder: FOLDER/metadata.yaml and FOLDER/<folder's name>_0.db3 (sqlite3).
-/// Messages become durable in transactions of about one second: a killed recorder loses at most
-/// that, and what it wrote stays readable without metadata.yaml. Not thread-safe.
+enum class Storage { kSqlite3, kMcap };
+
+/// Whether a recording of this name is one MCAP file ("drive.mcap") and not a folder.
+bool names_mcap_file(const std::string& path);
+
+/// Writes a rosbag2 folder: FOLDER/metadata.yaml and FOLDER/<folder's name>_0.db3 or .mcap; or one
+/// .mcap file alone, which is told by its name. Messages become durable about once a second (a
+/// transaction, a chunk): a killed recorder loses at most that, and what it wrote stays readable
+/// without metadata.yaml. Not thread-safe.
 class Rosbag2Writer {
  public:
-  /// Creates the folder and its parents. Throws LogError when it exists and is not empty, or can't
-  /// be created. `largest_bytes` limits the size of the .db3 (0 = none): what would exceed it fails
-  /// as on a full disk.
-  explicit Rosbag2Writer(const std::string& folder, std::uint64_t largest_bytes = 0);
+  /// Creates the folder and its parents. Throws LogError when it exists and is not empty, when the
+  /// file exists, or it can't be created. `largest_bytes` limits the size of the .db3 or .mcap (0 =
+  /// none): what would exceed it fails as on a full disk.
+  explicit Rosbag2Writer(const std::string& path,
+                         Storage storage = Storage::kSqlite3,
+                         std::uint64_t largest_bytes = 0);
   /// Closes; errors are swallowed, so call close() to hear of them.
   ~Rosbag2Writer();
   Rosbag2Writer(const Rosbag2Writer&) = delete;
@@ -49,7 +58,7 @@ class Rosbag2Writer {
   /// Makes all durable now, without waiting for the second to pass.
   void flush();
 
-  /// Finishes the .db3 and writes metadata.yaml. Further writes throw LogError.
+  /// Finishes the .db3 or .mcap and writes metadata.yaml. Further writes throw LogError.
   void close();
 
   std::uint64_t messages_written() const;

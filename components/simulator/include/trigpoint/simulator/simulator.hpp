@@ -7,6 +7,7 @@
 #include "trigpoint/base/pose.hpp"
 #include "trigpoint/base/time.hpp"
 #include "trigpoint/recording/log.hpp"
+#include "trigpoint/recording/rosbag2_writer.hpp"
 #include "trigpoint/simulator/scenario.hpp"
 
 #include <Eigen/Core>
@@ -100,14 +101,15 @@ std::unique_ptr<ScenarioReader> open_scenario(const Scenario& scenario,
 /// Called with a share of 0 to 1.
 using Progress = std::function<void(double)>;
 
-/// Writes out_dir/log (rosbag2), truth.tum (with traffic: moving_*.txt), scenario.yaml and
-/// robot.yaml (an overlay with the section `robot`). Throws recording::LogError or
+/// Writes out_dir/log (rosbag2 in `storage`), truth.tum (with traffic: moving_*.txt), scenario.yaml
+/// and robot.yaml (an overlay with the section `robot`). Throws recording::LogError or
 /// std::runtime_error naming the file and the cause; out_dir may exist, out_dir/log must not.
 void simulate(const Scenario& scenario,
               std::uint64_t seed,
               std::optional<double> duration_s,
               const std::string& out_dir,
               const Progress& progress = {},
-              const StreamOptions& options = {});
+              const StreamOptions& options = {},
+              recording::Storage storage = recording::Storage::kSqlite3);
 
 }  // namespace trigpoint::simulator

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
-// The schema that Foxglove and Lichtblick read, from the IDL that the bus is compiled from.
+// The schema of a message as Foxglove, Lichtblick and MCAP files have it, from the IDL that the bus
+// is compiled from. Needs no DDS and no generated type (library trigpoint::message_definition).
 #pragma once
 
 #include <map>
@@ -8,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-namespace trigpoint::live {
+namespace trigpoint::bus {
 
 struct Field {
   std::string type;  ///< "float64", "string", "std_msgs/Header"
@@ -31,4 +32,4 @@ std::string message_definition(const Structs& structs, const std::string& ros_ty
 /// The same from what is in idl/.
 std::string message_definition(const std::string& ros_type);
 
-}  // namespace trigpoint::live
+}  // namespace trigpoint::bus

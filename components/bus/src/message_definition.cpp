@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
-#include "message_definition.hpp"
+#include "trigpoint/bus/message_definition.hpp"
 
-#include "embedded.hpp"
+#include "embedded_idl.hpp"
 
 #include <algorithm>
 #include <array>
@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
-namespace trigpoint::live {
+namespace trigpoint::bus {
 
 namespace {
 
@@ -221,4 +221,4 @@ std::string message_definition(const std::string& ros_type) {
   return message_definition(structs, ros_type);
 }
 
-}  // namespace trigpoint::live
+}  // namespace trigpoint::bus

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
-#include "message_definition.hpp"
+#include "trigpoint/bus/message_definition.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <stdexcept>
 
-namespace trigpoint::live {
+namespace trigpoint::bus {
 namespace {
 
 using ::testing::HasSubstr;
@@ -56,4 +56,4 @@ TEST(MessageDefinition, refuses_idl_that_it_does_not_understand) {
 }
 
 }  // namespace
-}  // namespace trigpoint::live
+}  // namespace trigpoint::bus
