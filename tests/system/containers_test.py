@@ -254,7 +254,8 @@ def check_session(services):
     rmse = float(re.search(r"^\| fused\.tum +\| +none \| +([0-9.]+)", text, re.M)[1])
     points = int(re.search(r"map\.pcd\): (\d+) points", text)[1])
     check("trigpoint_lio_mapper" in text[text.index("## Restarts"):], "the report does not list the mapper's restart")
-    print(f"fused.tum: {rmse} m off; map.pcd: {points} points")
+    missed = re.search(r"^Scans missed: \d+", text, re.M)
+    print(f"fused.tum: {rmse} m off; map.pcd: {points} points; {missed[0] if missed else 'no scans missed'}")
     check(rmse < LARGEST_RMSE_M, "the fused trajectory is wrong")
     check(points > FEWEST_MAP_POINTS, "the map is too small")
 
@@ -285,8 +286,7 @@ def drive(engine, image, build, folder):
     with tempfile.TemporaryFile("w+") as log:
         options = compose.run_options({key: services.of_files()["session"][key] for key in ("network_mode", "user", "volumes", "environment")})
         command = ["trigpoint", "play", "short", "--rate", "1", "--config", "/sessions/current/config.yaml", "--session", "/sessions/current"]
-        player = (subprocess.Popen([*engine.command, "run", "--rm", *options, image, *command], stdout=log, stderr=log)
-                  if engine.keeps_running else subprocess.Popen(engine.prepared(image, options, command), stdout=log, stderr=log))
+        player = subprocess.Popen(engine.foreground(image, options, command), stdout=log, stderr=log)
         try:
             time.sleep(12.0)
             kill_some(services)

@@ -40,9 +40,12 @@ class Engine:
         environment = dict(os.environ, DOCKER_BUILDKIT="0")
         return self("build", "--network", "host", "-f", dockerfile, "-t", image, context, timeout=timeout, env=environment)
 
+    def foreground(self, image, options, command):
+        """The command line that runs it to its end."""
+        return [*self.command, "run", "--rm", *options, image, *command]
+
     def once(self, image, options, command, **more):
-        """Runs it to its end."""
-        return self("run", "--rm", *options, image, *command, **more)
+        return run(self.foreground(image, options, command), **more)
 
     def start(self, name, image, options, command):
         self.containers.append(name)
@@ -88,6 +91,11 @@ class Podman(Engine):
     def __init__(self, folder, runtime):
         root = ["--root", os.path.join(folder, "store"), "--runroot", os.path.join(folder, "run")]
         super().__init__(["podman", *root, "--cgroup-manager", "cgroupfs", "--runtime", runtime], f"podman with {runtime}")
+        # Its own limits are higher than what a root without CAP_SYS_RESOURCE may set.
+        settings = os.path.join(folder, "containers.conf")
+        with open(settings, "w", encoding="utf-8") as file:
+            file.write("[containers]\ndefault_ulimits=[]\n[engine]\nevents_logger=\"file\"\n")
+        os.environ["CONTAINERS_CONF"] = settings
         # Without systemd nobody starts the health checks: health() does it.
         self.by_hand = not os.path.isdir("/run/systemd/system")
         if self.by_hand:
@@ -117,8 +125,8 @@ class Buildah:
     def build(self, dockerfile, context, image, timeout):
         return self("build", "--isolation", "chroot", "--pull-never", "-f", dockerfile, "-t", image, context, timeout=timeout)
 
-    def prepared(self, image, options, command):
-        """The command line of one process. Of the options it has those that chroot isolation knows."""
+    def foreground(self, image, options, command):
+        """Of the options it has those that chroot isolation knows."""
         container = self("from", "--pull-never", image, timeout=600).stdout.strip().splitlines()[-1]
         self.working.append(container)
         arguments, iterator = [], iter(options)
@@ -137,11 +145,11 @@ class Buildah:
         return [*self.command, "run", "--isolation", "chroot", *arguments, container, "--", *command]
 
     def once(self, image, options, command, **more):
-        return run(self.prepared(image, options, command), **more)
+        return run(self.foreground(image, options, command), **more)
 
     def start(self, name, image, options, command):
         log = tempfile.TemporaryFile("w+", encoding="utf-8")
-        process = subprocess.Popen(self.prepared(image, options, command), stdout=log, stderr=log, start_new_session=True)
+        process = subprocess.Popen(self.foreground(image, options, command), stdout=log, stderr=log, start_new_session=True)
         self.running[name] = (process, log, image, options)
 
     def execute(self, name, *command):
