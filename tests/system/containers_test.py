@@ -207,9 +207,7 @@ def check_seen_from_host(build, domain):
 
 def program_in(engine, container):
     """The process below the supervisor, on the host; None between two lives."""
-    supervisor = engine.pid(container)
-    with open(f"/proc/{supervisor}/task/{supervisor}/children", encoding="utf-8") as file:
-        return next(map(int, file.read().split()), None)
+    return next(iter(engines.children(engine.pid(container))), None)
 
 
 def kill_some(services):

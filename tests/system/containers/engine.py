@@ -20,6 +20,15 @@ def run(command, check=True, timeout=120, **more):
     return result
 
 
+def children(process):
+    """Of all its threads, as numbers on the host."""
+    found = []
+    for thread in os.listdir(f"/proc/{process}/task"):
+        with open(f"/proc/{process}/task/{thread}/children", encoding="utf-8") as file:
+            found += map(int, file.read().split())
+    return found
+
+
 class Engine:
     """docker or podman: one command line."""
 
@@ -162,14 +171,11 @@ class Buildah:
     def pid(self, name):
         """Of the supervisor below buildah's own processes."""
         below = [self.running[name][0].pid]
-        for _ in range(8):
-            for parent in list(below):
-                with open(f"/proc/{parent}/task/{parent}/children", encoding="utf-8") as file:
-                    below += [int(child) for child in file.read().split() if int(child) not in below]
-        for process in below:
+        for process in below:  # which grows
             with open(f"/proc/{process}/cmdline", encoding="utf-8") as file:
                 if file.read().split("\0")[0] == "trigpoint_supervise":
                     return process
+            below += children(process)
         raise RuntimeError(f"{name}: no trigpoint_supervise below {below}")
 
     def health(self, name):
