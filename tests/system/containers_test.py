@@ -129,37 +129,64 @@ def build_image(engine, build, folder, base, whole):
 
 
 class Services:
-    """Those of the compose file, with the options that they have there."""
+    """Those of the compose files on one computer, with the options that they have there."""
 
-    def __init__(self, engine, image, folder, domain, config):
-        self.engine, self.image, self.sessions = engine, image, os.path.join(folder, "sessions")
-        self.prefix = f"trigpoint-test-{os.getpid()}-"
-        self.environment = {"ROS_DOMAIN_ID": domain, "TRIGPOINT_SESSIONS": self.sessions, "TRIGPOINT_CONFIG": config}
+    def __init__(self, engine, image, folder, computer="here", files=("compose.yaml",), **environment):
+        self.engine, self.image, self.files = engine, image, files
+        self.sessions = os.path.join(folder, "sessions-" + computer)
+        self.prefix = f"trigpoint-test-{os.getpid()}-{computer}-"
+        self.environment = {"TRIGPOINT_SESSIONS": self.sessions, **environment}
+        self.network = ""  # in place of the host's
         os.mkdir(self.sessions)
         os.chown(self.sessions, 1000, 1000)
 
     def name(self, service):
         return self.prefix + service
 
-    def of_files(self, files=("compose.yaml",), **changes):
-        return compose.services(files, {**self.environment, **changes})
+    def of_files(self, service, without=(), **changes):
+        found = compose.services(self.files, {**self.environment, **changes})[service]
+        if self.network:
+            found["network_mode"] = self.network
+        return {key: value for key, value in found.items() if key not in without}
 
-    def session(self, files=("compose.yaml",), **changes):
+    def session(self, **changes):
         """Its output and exit code."""
-        service = self.of_files(files, **changes)["session"]
-        options = compose.run_options({key: value for key, value in service.items() if key != "restart"})
-        return self.engine.once(self.image, options, service["command"], check=False)
+        service = self.of_files("session", without=["restart"], **changes)
+        return self.engine.once(self.image, compose.run_options(service), service["command"], check=False)
 
-    def start(self):
-        for name in PROCESSES:
-            service = self.of_files()[name]
+    def start(self, names):
+        for name in names:
+            service = self.of_files(name)
             self.engine.start(self.name(name), self.image, compose.run_options(service), service["command"])
+        for name in names:
+            self.wait_until_healthy(name)
+
+    def stop(self, names):
+        for name in names:
+            code = self.engine.stop(self.name(name))
+            check(code == 0, f"{name} ended with {code}:\n{self.engine.logs(self.name(name))[-2000:]}")
+
+    def beside(self):
+        """Options of one more container, as somebody would start it by hand."""
+        service = self.of_files("session")
+        return compose.run_options({key: service[key] for key in ("network_mode", "user", "volumes", "environment")})
 
     def once(self, *command, **more):
-        """One more container beside them, as somebody would start it by hand."""
-        service = self.of_files()["session"]
-        options = compose.run_options({key: service[key] for key in ("network_mode", "user", "volumes", "environment")})
-        return self.engine.once(self.image, options, command, **more)
+        return self.engine.once(self.image, self.beside(), command, **more)
+
+    def play(self, meanwhile=lambda: None):
+        """The short drive, in real time."""
+        command = ["trigpoint", "play", "short", "--rate", "1", "--config", "/sessions/current/config.yaml", "--session", "/sessions/current"]
+        with tempfile.TemporaryFile("w+") as log:
+            player = subprocess.Popen(self.engine.foreground(self.image, self.beside(), command), stdout=log, stderr=log)
+            try:
+                time.sleep(12.0)
+                meanwhile()
+                code = player.wait(120)
+            finally:
+                player.kill()
+            log.seek(0)
+            check(code == 0, f"the player ended with {code}:\n{log.read()[-2000:]}")
 
     def wait_until_healthy(self, name):
         wait_until(f"{name} is healthy", HEALTHY_S, lambda: self.engine.health(self.name(name)) == "healthy")
@@ -239,65 +266,106 @@ def check_hang(services):
     services.wait_until_healthy("gps_odometry")
 
 
-def check_session(services):
-    report = services.once("trigpoint", "report", "/sessions/current", timeout=300, check=False)
-    check(report.returncode == 0, f"trigpoint report ended with {report.returncode}:\n{report.stdout[-3000:]}")
-    session = os.path.realpath(services.sessions + "/current")
-    wanted = {"config.yaml", "datum.yaml", "fused.tum", "gps.tum", "lio.tum", "keyframes.sqlite", "map.pcd", "report.html", "restarts.csv", "trajectories.png"}
+def check_session(session, more):
+    wanted = {"config.yaml", "datum.yaml", "fused.tum", "gps.tum", "lio.tum", "keyframes.sqlite", "map.pcd", "report.html", "trajectories.png", *more}
     check(wanted <= set(os.listdir(session)), f"the session lacks {wanted - set(os.listdir(session))}")
-    owners = {os.stat(os.path.join(session, name)).st_uid for name in os.listdir(session)}
-    check(owners == {1000}, f"files of the session belong to {owners}")
     with open(session + "/report.md", encoding="utf-8") as file:
         text = file.read()
     rmse = float(re.search(r"^\| fused\.tum +\| +none \| +([0-9.]+)", text, re.M)[1])
     points = int(re.search(r"map\.pcd\): (\d+) points", text)[1])
-    check("trigpoint_lio_mapper" in text[text.index("## Restarts"):], "the report does not list the mapper's restart")
     missed = re.search(r"^Scans missed: \d+", text, re.M)
-    print(f"fused.tum: {rmse} m off; map.pcd: {points} points; {missed[0] if missed else 'no scans missed'}")
+    print(f"fused.tum: {rmse} m off; map.pcd: {points} points; {missed[0] if missed else 'no scans missed'}", flush=True)
     check(rmse < LARGEST_RMSE_M, "the fused trajectory is wrong")
     check(points > FEWEST_MAP_POINTS, "the map is too small")
 
 
-def drive(engine, image, build, folder):
-    domain = str(60 + os.getpid() % 40)
-    config = os.path.join(folder, "robot.yaml")
-    with open(config, "w", encoding="utf-8") as file:
-        file.write(run([build + "/bin/trigpoint", "config", "--for", "short"]).stdout)
-    services = Services(engine, image, folder, domain, config)
+def check_restart_is_told(session):
+    owners = {os.stat(os.path.join(session, name)).st_uid for name in os.listdir(session)}
+    check(owners == {1000}, f"files of the session belong to {owners}")
+    with open(session + "/report.md", encoding="utf-8") as file:
+        check(re.search(r"## Restarts.*trigpoint_lio_mapper", file.read(), re.S), "the report does not list the mapper's restart")
+
+
+def robot_yaml(build, folder):
+    """Only what differs from the defaults on the robot of the short drive, as docs/docker.md wants it."""
+    import yaml
+    default, short = (yaml.safe_load(run([build + "/bin/trigpoint", "config", *more]).stdout) for more in ((), ("--for", "short")))
+    differs = {section: {key: value for key, value in keys.items() if value != default[section][key]} for section, keys in short.items()}
+    file = os.path.join(folder, "robot.yaml")
+    with open(file, "w", encoding="utf-8") as output:
+        yaml.safe_dump({section: keys for section, keys in differs.items() if keys}, output)
+    return file
+
+
+def one_computer(engine, image, build, folder, config, domain):
+    services = Services(engine, image, folder, ROS_DOMAIN_ID=domain, TRIGPOINT_CONFIG=config)
     check_faults(services, folder)
-    begun = services.session(("compose.yaml", "compose.lan.yaml"), TRIGPOINT_CONFIG=os.path.join(compose.FOLDER, "robot.yaml"), TRIGPOINT_HOST="base")
-    check(begun.returncode == 0 and begun.stdout.rstrip().endswith("-base"), begun.stdout)
-    with open(services.sessions + "/current/config.yaml", encoding="utf-8") as file:
-        check("datagram_bytes: 1472" in file.read(), "the profile for two computers was not used")
     begun = services.session()
     check(begun.returncode == 0, begun.stdout)
-
-    services.start()
-    for name in PROCESSES:
-        services.wait_until_healthy(name)
+    services.start(PROCESSES)
     check_confinement(services)
     check_seen_from_host(build, domain)
     joined = services.session()
     check(joined.returncode == 0 and "is going on" in joined.stdout, f"a second drive began beside the first: {joined.stdout}")
-    print("healthy, not root, seen from the host")
-
-    with tempfile.TemporaryFile("w+") as log:
-        options = compose.run_options({key: services.of_files()["session"][key] for key in ("network_mode", "user", "volumes", "environment")})
-        command = ["trigpoint", "play", "short", "--rate", "1", "--config", "/sessions/current/config.yaml", "--session", "/sessions/current"]
-        player = subprocess.Popen(engine.foreground(image, options, command), stdout=log, stderr=log)
-        try:
-            time.sleep(12.0)
-            kill_some(services)
-            code = player.wait(120)
-        finally:
-            player.kill()
-        log.seek(0)
-        check(code == 0, f"the player ended with {code}:\n{log.read()[-2000:]}")
+    print("one computer: healthy, not root, seen from the host", flush=True)
+    services.play(meanwhile=lambda: kill_some(services))
     check_hang(services)
-    for name in PROCESSES:
-        code = engine.stop(services.name(name))
-        check(code == 0, f"{name} ended with {code}:\n{engine.logs(services.name(name))[-2000:]}")
-    check_session(services)
+    services.stop(PROCESSES)
+    report = services.once("trigpoint", "report", "/sessions/current", timeout=300, check=False)
+    check(report.returncode == 0, f"trigpoint report ended with {report.returncode}:\n{report.stdout[-3000:]}")
+    check_session(os.path.realpath(services.sessions + "/current"), ["restarts.csv"])
+    check_restart_is_told(os.path.realpath(services.sessions + "/current"))
+
+
+# ---- two computers ------------------------------------------------------------------------------
+
+
+def connect(engine, image):
+    """Two networks with a cable between them, each held by a container that does nothing; their names."""
+    names = [f"trigpoint-test-{os.getpid()}-network-{number}" for number in (1, 2)]
+    for name in names:
+        engine.start(name, image, ["--network", "none"], ["sleep", "infinity"])
+    pids = [str(engine.pid(name)) for name in names]
+    ends = [f"tp{os.getpid()}a", f"tp{os.getpid()}b"]
+    run(["ip", "link", "add", ends[0], "type", "veth", "peer", "name", ends[1]])
+    for number, (pid, end) in enumerate(zip(pids, ends), start=1):
+        run(["ip", "link", "set", end, "netns", pid])
+        inside = ["nsenter", "-t", pid, "-n", "ip"]
+        run([*inside, "addr", "add", f"10.78.0.{number}/24", "dev", end])
+        run([*inside, "link", "set", end, "up"])
+        run([*inside, "link", "set", "lo", "up"])
+    return names
+
+
+def two_computers(engine, image, build, folder, config):
+    """compose.lan.yaml: all as in the files, but the networks in place of the host's."""
+    roles = {"robot": ["lio_mapper", "clock_watch"], "base": ["gps_odometry", "fusion_gate", "clock_watch"]}
+    computers = {}
+    for (name, started), network in zip(roles.items(), connect(engine, image)):
+        services = Services(engine, image, folder, name, ("compose.yaml", "compose.lan.yaml"), TRIGPOINT_CONFIG=config, TRIGPOINT_HOST=name)
+        services.network = "container:" + network
+        begun = services.session()
+        check(begun.returncode == 0 and begun.stdout.rstrip().endswith("-" + name), begun.stdout)
+        with open(services.sessions + "/current/config.yaml", encoding="utf-8") as file:
+            check("datagram_bytes: 1472" in file.read(), "the profile for two computers was not used")
+        services.start(started)
+        computers[name] = services
+    print("two computers: healthy", flush=True)
+    computers["robot"].play()
+    for name, services in computers.items():
+        services.stop(roles[name])
+    whole = os.path.join(folder, "whole")
+    parts = [os.path.realpath(services.sessions + "/current") for services in computers.values()]
+    run([os.path.join(ROOT, "bringup", "collect"), whole, *parts], timeout=300, env=dict(os.environ, TRIGPOINT_BIN=build + "/bin"))
+    clocks = [f"clock.{os.path.basename(part)}.csv" for part in parts]
+    check_session(whole, clocks)
+
+
+def drive(engine, image, build, folder):
+    config = robot_yaml(build, folder)
+    one_computer(engine, image, build, folder, config, domain=str(60 + os.getpid() % 40))
+    if engine.keeps_running:
+        two_computers(engine, image, build, folder, config)
 
 
 def main():
@@ -328,7 +396,7 @@ def main():
         engine = engines.find(folder, build + "/debian-base.tar", base, arguments.engine)
         if engine is None:
             skip("no container engine can start a process here")
-        print(f"engine: {engine.name}" + ("" if engine.keeps_running else "; restarts of containers and capabilities are not tested"), flush=True)
+        print(f"engine: {engine.name}" + ("" if engine.keeps_running else "; restarts of containers, capabilities and two computers are not tested"), flush=True)
         try:
             drive(engine, build_image(engine, build, folder, base, arguments.whole), build, folder)
         finally:
