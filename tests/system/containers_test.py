@@ -254,16 +254,18 @@ def kill_some(services):
 
 
 def check_hang(services):
-    """With its supervisor stopped too, a filter that hangs is told from one that lives."""
-    container = services.name("gps_odometry")
-    stopped = [services.engine.pid(container), program_in(services.engine, container)]
-    for process in stopped:
-        os.kill(process, signal.SIGSTOP)
-    said = services.engine.execute(container, "trigpoint_service", "healthy")
-    for process in reversed(stopped):
-        os.kill(process, signal.SIGCONT)
-    check(said.returncode != 0 and "runs, but said nothing" in said.stdout, f"health of what hangs: {said.returncode}, {said.stdout}")
-    services.wait_until_healthy("gps_odometry")
+    """With its supervisor stopped too, a program that hangs is told from one that lives."""
+    for name in PROCESSES:
+        container = services.name(name)
+        stopped = [services.engine.pid(container), program_in(services.engine, container)]
+        for process in stopped:
+            os.kill(process, signal.SIGSTOP)
+        said = services.engine.execute(container, "trigpoint_service", "healthy")
+        for process in reversed(stopped):
+            os.kill(process, signal.SIGCONT)
+        check(said.returncode != 0 and "runs, but said nothing" in said.stdout, f"health of {name}, which hangs: {said.returncode}, {said.stdout}")
+    for name in PROCESSES:
+        services.wait_until_healthy(name)
 
 
 def check_session(session, more):
