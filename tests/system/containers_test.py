@@ -216,6 +216,8 @@ def check_confinement(services):
         container = services.name(name)
         who = services.engine.execute(container, "id", "-u").stdout.split()[-1]
         check(who == "1000", f"{name} runs as user {who}")
+        builders = services.engine.execute(container, "sh", "-c", "command -v g++ cmake java")
+        check(builders.returncode != 0, f"the image has what only building needs: {builders.stdout}")
         if not services.engine.keeps_running:
             continue
         with open(f"/proc/{services.engine.pid(container)}/status", encoding="utf-8") as file:

@@ -127,7 +127,7 @@ class Buildah:
         return run([*self.command, *arguments], **more)
 
     def import_base(self, tar, image):
-        container = self("from", "scratch").stdout.strip()
+        container = self("from", "scratch").stdout.split()[-1]  # after warnings
         self("add", "-q", container, tar, timeout=600)
         self("commit", "-q", "--rm", container, image, timeout=600)
 
@@ -136,7 +136,7 @@ class Buildah:
 
     def foreground(self, image, options, command):
         """Of the options it has those that chroot isolation knows."""
-        container = self("from", "--pull-never", image, timeout=600).stdout.strip().splitlines()[-1]
+        container = self("from", "--pull-never", image, timeout=600).stdout.split()[-1]
         self.working.append(container)
         arguments, iterator = [], iter(options)
         for option in iterator:
