@@ -2,11 +2,9 @@
 // Copyright the Trigpoint developers
 #include "alive_check.hpp"
 
-#include "trigpoint/bus/bus.hpp"
 #include "trigpoint/bus/config.hpp"
-#include "trigpoint/bus/loop.hpp"
-#include "trigpoint/bus/topics.hpp"
 
+#include "process_heard.hpp"
 #include "program_name.hpp"
 
 #include <chrono>
@@ -19,8 +17,6 @@
 namespace trigpoint::cli {
 
 namespace {
-
-using Message = diagnostic_msgs::msg::DiagnosticArray;
 
 std::set<unsigned> processes_of(const std::string& program) {
   std::set<unsigned> found;
@@ -50,29 +46,6 @@ std::string seconds_text(double seconds) {
   return text.str();
 }
 
-/// Listens until one of the processes is heard; false when none is within the time.
-bool is_heard(const bus::Config& config, const std::set<unsigned>& processes, double patience_s) {
-  bus::Loop loop;
-  bus::Participant participant(config, "doctor");
-  bool heard = false;
-  const auto listen = [&](const Message&, const bus::MessageInfo& info) {
-    loop.post(
-        [&, writer = info.writer_guid] {
-          const auto process = participant.process_of(writer);
-          if (process && processes.contains(*process)) {
-            heard = true;
-            loop.stop();
-          }
-        },
-        bus::WhenFull::kDropOldest);
-  };
-  const bus::Subscription<Message> diagnostics(participant, bus::topics::diagnostics, listen);
-  const bus::Subscription<Message> clocks(participant, bus::topics::clock_probe, listen);
-  loop.every(std::chrono::nanoseconds(from_seconds(patience_s)), [&loop] { loop.stop(); });
-  loop.run();
-  return heard;
-}
-
 }  // namespace
 
 int check_alive(const SystemConfig& config, const std::string& program, double patience_s) {
@@ -83,7 +56,7 @@ int check_alive(const SystemConfig& config, const std::string& program, double p
   }
   const std::string domain = "DDS domain " + std::to_string(bus::domain_of(config.bus));
   const auto begin = std::chrono::steady_clock::now();
-  if (!is_heard(config.bus, processes, patience_s)) {
+  if (!recording::is_heard(config.bus, processes, patience_s)) {
     std::cerr << "trigpoint doctor: " << program << " (process " << list_of(processes)
               << ") runs, but said nothing on " << domain << " within " << seconds_text(patience_s)
               << ": it hangs, is still starting, or is on another domain or network interface\n";
