@@ -399,12 +399,14 @@ def main():
         os.chmod(folder, 0o755)
         engine = engines.find(folder, build + "/debian-base.tar", base, arguments.engine)
         if engine is None:
+            engines.unmount_below(folder)
             skip("no container engine can start a process here")
         print(f"engine: {engine.name}" + ("" if engine.keeps_running else "; restarts of containers, capabilities and two computers are not tested"), flush=True)
         try:
             drive(engine, build_image(engine, build, folder, base, arguments.whole), build, folder)
         finally:
             engine.clean()
+            engines.unmount_below(folder)
 
 
 if __name__ == "__main__":

@@ -200,6 +200,14 @@ class Buildah:
             self("rm", container, check=False)
 
 
+def unmount_below(folder):
+    """What podman and buildah leave mounted on their stores, which are to be removed."""
+    with open("/proc/mounts", encoding="utf-8") as file:
+        mounts = [line.split()[1] for line in file]
+    for mount in sorted((mount for mount in mounts if mount.startswith(folder + "/")), reverse=True):
+        run(["umount", mount], check=False)
+
+
 def works(engine, image):
     try:
         return engine.once(image, ["--network", "host", "--user", "1000"], ["id", "-u"]).stdout.split()[-1:] == ["1000"]
