@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <csignal>
 #include <thread>
 
 namespace trigpoint::bus {
@@ -137,6 +138,47 @@ TEST(Doctor, finds_nothing_wrong_where_nothing_is) {
               AllOf(HasSubstr("writes datum, gps/fix, imu/data"),
                     Not(HasSubstr("! imu")),
                     Not(HasSubstr("trigpoint (process"))));
+}
+
+// ---- health checks ------------------------------------------------------------------------------
+
+tests::CommandResult health_of(const std::string& program, const std::string& domain) {
+  return tests::run_command({std::string(TRIGPOINT_BIN_DIR) + "/trigpoint",
+                             "doctor",
+                             "--alive",
+                             program,
+                             "--seconds",
+                             "4"},
+                            60s,
+                            {{"ROS_DOMAIN_ID", domain}});
+}
+
+TEST(Doctor, tells_a_program_that_hangs_or_is_deaf_from_one_that_lives) {
+  const std::string program = "trigpoint_fusion_gate";
+  const std::string domain = tests::own_domain();
+  const tests::Command gate({std::string(TRIGPOINT_BIN_DIR) + "/" + program},
+                            {{"ROS_DOMAIN_ID", domain}});
+  for (int i = 0; i < 100 && gate.output_so_far().find("ready") == std::string::npos; ++i) {
+    std::this_thread::sleep_for(100ms);
+  }
+  const auto lives = health_of(program, domain);
+  EXPECT_EQ(lives.exit_code, 0) << lives.output;
+  EXPECT_THAT(lives.output,
+              HasSubstr(std::to_string(gate.pid()) + ") was heard on DDS domain " + domain));
+
+  const auto elsewhere = health_of(program, tests::own_domain(1));
+  EXPECT_EQ(elsewhere.exit_code, 1);
+  EXPECT_THAT(elsewhere.output, HasSubstr("runs, but said nothing on DDS domain"));
+
+  gate.signal(SIGSTOP);
+  const auto hangs = health_of(program, domain);
+  gate.signal(SIGCONT);
+  EXPECT_EQ(hangs.exit_code, 1);
+  EXPECT_THAT(hangs.output, HasSubstr("runs, but said nothing on DDS domain " + domain));
+
+  const auto absent = health_of("trigpoint_no_such_program", domain);
+  EXPECT_EQ(absent.exit_code, 1);
+  EXPECT_THAT(absent.output, HasSubstr("no trigpoint_no_such_program runs here"));
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 // Copyright the Trigpoint developers
 #include "trigpoint/shell/shell.hpp"
 
+#include "alive_check.hpp"
 #include "bus_survey.hpp"
 #include "doctor_findings.hpp"
 #include "gps_filter_check.hpp"
@@ -28,6 +29,7 @@ struct DoctorOptions {
   double seconds{5.0};
   bool gps_filter{false};
   double rate{5.0};
+  std::string alive;  ///< program
 };
 
 /// 0 when nothing is wrong.
@@ -209,9 +211,19 @@ void add_doctor(CLI::App& app, Chosen& chosen) {
       ->capture_default_str()
       ->check(CLI::Range(0.1, 100.0))
       ->needs("--gps-filter");
+  verb->add_option(
+          "--alive",
+          options->alive,
+          "only tell whether this program (trigpoint_lio_mapper) runs here and is heard on "
+          "the bus, for at most --seconds; ends as soon as it is. For health checks")
+      ->excludes("LOG")
+      ->excludes("--gps-filter");
   verb->footer("Exit code 0: nothing wrong found; 1: see the lines with '!' or 'FAIL'.");
   verb->callback([options, &chosen] {
     chosen = [options] {
+      if (!options->alive.empty()) {
+        return check_alive(load_config_of(options->input), options->alive, options->seconds);
+      }
       if (options->gps_filter) {
         return check_gps_filter(load_config_of(options->input), options->rate);
       }

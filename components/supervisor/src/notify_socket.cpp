@@ -16,16 +16,20 @@
 
 namespace trigpoint::supervisor {
 
-NotifySocket::NotifySocket() : address_("@trigpoint-supervise-" + std::to_string(getpid())) {
-  socket_ = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+/// The kernel chooses the name: one made of our process number would be everybody's in containers,
+/// which share the host's network, and with it these names, but number their processes from 1.
+NotifySocket::NotifySocket()
+    : socket_(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)) {
   sockaddr_un own{};
   own.sun_family = AF_UNIX;
-  std::memcpy(own.sun_path + 1, address_.data() + 1, address_.size() - 1);
-  const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + address_.size());
+  socklen_t size = sizeof(sa_family_t);
   if (socket_ < 0 || ::bind(socket_, reinterpret_cast<sockaddr*>(&own), size) != 0) {
     throw std::runtime_error(std::string("cannot listen to the program's notices: ") +
                              std::strerror(errno));
   }
+  size = sizeof own;
+  ::getsockname(socket_, reinterpret_cast<sockaddr*>(&own), &size);
+  address_ = "@" + std::string(own.sun_path + 1, size - offsetof(sockaddr_un, sun_path) - 1);
 }
 
 NotifySocket::~NotifySocket() {

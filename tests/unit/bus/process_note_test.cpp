@@ -18,6 +18,12 @@ TEST(ProcessNote, says_our_own_number) {
   EXPECT_EQ(noted(process_note()), static_cast<unsigned>(getpid()));
 }
 
+TEST(ProcessNote, does_not_take_the_number_of_another_container_for_one_of_ours) {
+  EXPECT_EQ(noted("enclave=/;process=12;in=1;"), kNumberedElsewhere);
+  EXPECT_EQ(number_that_counts_here(kNumberedElsewhere), std::nullopt);
+  EXPECT_EQ(number_that_counts_here(12), 12U);
+}
+
 TEST(ProcessNote, of_a_ros_2_node_says_nothing) {
   EXPECT_EQ(noted("enclave=/;"), std::nullopt);
   EXPECT_EQ(noted(""), std::nullopt);

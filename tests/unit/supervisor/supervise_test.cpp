@@ -161,5 +161,25 @@ TEST_F(Supervise, says_what_cannot_be_started) {
             2);
 }
 
+// As containers with the host's network do: one network, and everybody is process 1.
+TEST_F(Supervise, runs_beside_another_one_of_the_same_number) {
+  const std::vector<std::string> apart{"unshare", "--pid", "--fork", "--kill-child"};
+  std::vector<std::string> probe = apart;
+  probe.emplace_back("true");
+  if (tests::run_command(probe).exit_code != 0) {
+    GTEST_SKIP() << "no process numbers of one's own here (unshare --pid, by root)";
+  }
+  std::vector<std::string> first = apart;
+  const std::vector<std::string> patient = command("exec sleep 60");
+  first.insert(first.end(), patient.begin(), patient.end());
+  const Command running(first);
+  ASSERT_TRUE(wait_for_lives(1));
+  std::vector<std::string> second = apart;
+  const std::vector<std::string> quick = command("exit 0");
+  second.insert(second.end(), quick.begin(), quick.end());
+  const CommandResult ended = tests::run_command(second);
+  EXPECT_EQ(ended.exit_code, 0) << ended.output;
+}
+
 }  // namespace
 }  // namespace trigpoint

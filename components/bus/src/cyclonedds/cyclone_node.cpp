@@ -168,7 +168,7 @@ std::optional<unsigned> CycloneNode::process_of(const std::string& writer_guid) 
     dds_return_loan(reader, samples.data(), count);
   }
   dds_delete(reader);
-  return found ? found : process_in_fastdds_guid(writer_guid);
+  return found ? number_that_counts_here(*found) : process_in_fastdds_guid(writer_guid);
 }
 
 void CycloneNode::tell(const Event& event) const {

@@ -85,7 +85,7 @@ void FastNode::on_participant_discovery(dds::DomainParticipant*,
 std::optional<unsigned> FastNode::process_of(const std::string& writer_guid) {
   const std::lock_guard lock(discovery_mutex_);
   const auto noted = processes_.find(participant_of(writer_guid));
-  return noted != processes_.end() ? std::optional(noted->second)
+  return noted != processes_.end() ? number_that_counts_here(noted->second)
                                    : process_in_fastdds_guid(writer_guid);
 }
 

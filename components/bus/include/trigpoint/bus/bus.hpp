@@ -31,8 +31,8 @@ class Participant {
 
   backend::Node& node() { return *node_; }
 
-  /// The number of the process that a matched writer belongs to, where it tells; it may run on
-  /// another computer.
+  /// The number of the process that a matched writer belongs to, where it tells and is not numbered
+  /// by another container; it may run on another computer.
   std::optional<unsigned> process_of(const std::string& writer_guid) {
     return node_->process_of(writer_guid);
   }
