@@ -54,7 +54,8 @@ constexpr auto kToFindEachOther = 30s;
 constexpr auto kAfterMatching = 1s;    ///< the first samples of a match may be lost
 constexpr auto kAfterTheFirst = 1s;    ///< answer of all, before anything counts
 constexpr auto kBeforeTheEnd = 500ms;  ///< sent, but not counted: a last sweep lacks its IMU
-constexpr auto kDrain = 1500ms;
+constexpr auto kLongestDrain = 15s;    ///< what is not answered by then is lost
+constexpr auto kLastStatus = 200ms;    ///< the processing time comes behind the odometry
 
 Nanoseconds now_ns() {
   return std::chrono::nanoseconds(Clock::now().time_since_epoch()).count();
@@ -96,6 +97,14 @@ class Ledger {
     if (Sent* sent = begun_before(end_ns); sent != nullptr && processing_ms > 0.0) {
       sent->processing_ms = processing_ms;
     }
+  }
+
+  bool all_answered(Nanoseconds from_ns, Nanoseconds to_ns) const {
+    const std::lock_guard lock(mutex_);
+    return std::all_of(by_stamp_.begin(), by_stamp_.end(), [&](const auto& each) {
+      const Sent& sent = each.second;
+      return sent.sent_ns < from_ns || sent.sent_ns > to_ns || sent.received_ns != 0;
+    });
   }
 
   void write(std::ostream& out, const char* name, Nanoseconds from_ns, Nanoseconds to_ns) const {
@@ -240,8 +249,14 @@ class Drive {
                                     std::chrono::nanoseconds(due.at_ns - all.front().at_ns));
       std::visit([&](const auto& message) { send(due.stamp_ns, message); }, due.message);
     }
-    end_ns_ = now_ns();
-    std::this_thread::sleep_for(kDrain);
+    counted_to_ns_ = now_ns() - std::chrono::nanoseconds(kBeforeTheEnd).count();
+    const auto deadline = Clock::now() + kLongestDrain;
+    while (Clock::now() < deadline &&
+           !(clouds_sent_.all_answered(counted_from_ns(), counted_to_ns_) &&
+             imu_sent_.all_answered(counted_from_ns(), counted_to_ns_))) {
+      std::this_thread::sleep_for(20ms);
+    }
+    std::this_thread::sleep_for(kLastStatus);
   }
 
   /// False when nothing was ever answered.
@@ -249,15 +264,17 @@ class Drive {
     if (first_answer_ns_ == 0) {
       return false;
     }
-    const Nanoseconds from_ns = first_answer_ns_ + std::chrono::nanoseconds(kAfterTheFirst).count();
-    const Nanoseconds to_ns = end_ns_ - std::chrono::nanoseconds(kBeforeTheEnd).count();
     std::ofstream out(file);
-    clouds_sent_.write(out, "points", from_ns, to_ns);
-    imu_sent_.write(out, "imu", from_ns, to_ns);
+    clouds_sent_.write(out, "points", counted_from_ns(), counted_to_ns_);
+    imu_sent_.write(out, "imu", counted_from_ns(), counted_to_ns_);
     return static_cast<bool>(out.flush());
   }
 
  private:
+  Nanoseconds counted_from_ns() const {
+    return first_answer_ns_ + std::chrono::nanoseconds(kAfterTheFirst).count();
+  }
+
   void send(Nanoseconds stamp_ns, const sensor_msgs::msg::PointCloud2& message) {
     clouds_sent_.sent(stamp_ns, message.data().size());
     points_.publish(message);
@@ -274,7 +291,7 @@ class Drive {
   Ledger clouds_sent_;
   Ledger imu_sent_;
   std::atomic<Nanoseconds> first_answer_ns_{0};
-  Nanoseconds end_ns_{0};
+  Nanoseconds counted_to_ns_{0};
   Participant participant_;
   Publisher<sensor_msgs::msg::PointCloud2> points_;
   Publisher<sensor_msgs::msg::Imu> imu_;
