@@ -51,7 +51,11 @@ using namespace std::chrono_literals;
 /// for that point is there, so that no waiting for it is in the figures.
 constexpr Nanoseconds kAssembly_ns = 7'500'000;
 constexpr auto kToFindEachOther = 30s;
-constexpr auto kAfterMatching = 1s;    ///< the first samples of a match may be lost
+constexpr auto kAfterMatching = 1s;  ///< the first samples of a match may be lost
+/// By then the processes have all that they need to align map and odom. On a computer with much
+/// other work they may not have got so far: the drive waits there.
+constexpr Nanoseconds kLeadIn_ns = 4'000'000'000;
+constexpr auto kLongestHold = 60s;
 constexpr auto kAfterTheFirst = 1s;    ///< answer of all, before anything counts
 constexpr auto kBeforeTheEnd = 500ms;  ///< sent, but not counted: a last sweep lacks its IMU
 constexpr auto kLongestDrain = 15s;    ///< what is not answered by then is lost
@@ -243,10 +247,15 @@ class Drive {
   }
 
   void send(const std::vector<Due>& all) {
-    const Clock::time_point start = Clock::now();
+    Clock::time_point start = Clock::now();
+    bool is_leading_in = true;
     for (const Due& due : all) {
-      std::this_thread::sleep_until(start +
-                                    std::chrono::nanoseconds(due.at_ns - all.front().at_ns));
+      const Nanoseconds at_ns = due.at_ns - all.front().at_ns;
+      std::this_thread::sleep_until(start + std::chrono::nanoseconds(at_ns));
+      if (is_leading_in && at_ns > kLeadIn_ns) {
+        is_leading_in = false;
+        start += hold();
+      }
       std::visit([&](const auto& message) { send(due.stamp_ns, message); }, due.message);
     }
     counted_to_ns_ = now_ns() - std::chrono::nanoseconds(kBeforeTheEnd).count();
@@ -271,6 +280,15 @@ class Drive {
   }
 
  private:
+  /// Until something was answered; how long that took.
+  Clock::duration hold() const {
+    const Clock::time_point since = Clock::now();
+    while (first_answer_ns_ == 0 && Clock::now() - since < kLongestHold) {
+      std::this_thread::sleep_for(5ms);
+    }
+    return Clock::now() - since;
+  }
+
   Nanoseconds counted_from_ns() const {
     return first_answer_ns_ + std::chrono::nanoseconds(kAfterTheFirst).count();
   }
