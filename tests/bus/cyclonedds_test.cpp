@@ -74,6 +74,17 @@ TEST_F(CycloneSettings, that_make_no_sense_are_told_with_the_domain) {
   }
 }
 
+TEST_F(CycloneSettings, know_no_shared_memory_and_say_so_at_the_door) {
+  Config config = own_domain();
+  config.shared_memory = true;
+  try {
+    Participant participant(config, "wrong");
+    FAIL() << "accepted";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("bus.shared_memory"));
+  }
+}
+
 TEST(SmallDatagrams, carry_large_clouds) {
   Config config = own_domain();
   config.datagram_bytes = 1472;

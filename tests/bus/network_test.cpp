@@ -141,6 +141,44 @@ TEST(SmallBuffers, still_carry_every_two_megabyte_cloud_and_imu_sample) {
   EXPECT_EQ(imu_heard, imu_sent);
 }
 
+/// Files in /dev/shm that this process has mapped.
+std::size_t shared_files() {
+  const std::string maps = tests::read_file("/proc/self/maps");
+  std::size_t files = 0;
+  for (auto at = maps.find("/dev/shm/"); at != std::string::npos;
+       at = maps.find("/dev/shm/", at + 1)) {
+    ++files;
+  }
+  return files;
+}
+
+TEST(SharedMemory, is_used_only_when_asked_for_and_carries_clouds) {
+  if (std::string(backend::name()) != "fastdds") {
+    GTEST_SKIP() << "Fast DDS only";
+  }
+  constexpr std::uint32_t kClouds = 20;
+  for (const bool wanted : {false, true}) {
+    Config config = own_domain();
+    config.shared_memory = wanted;
+    Participant here(config, "here");
+    Participant there(config, "there");
+    Collected<std::uint32_t> heard;
+    Readers readers;
+    Subscription<sensor_msgs::msg::PointCloud2> subscription(
+        there, topics::points, [&](const auto& cloud, const MessageInfo&) {
+          heard.add(cloud.data().size() == 2'000'000 ? cloud.height() : 0);
+        });
+    Publisher publisher(here, topics::points, readers.events());
+    ASSERT_TRUE(readers.wait_for(1));
+    EXPECT_EQ(shared_files() > 0, wanted);
+    for (std::uint32_t number = 1; number <= kClouds; ++number) {
+      publisher.publish(to_message(two_megabytes(number)));
+      ASSERT_TRUE(heard.wait_for(number));
+    }
+    EXPECT_EQ(heard.items().back(), kClouds);
+  }
+}
+
 TEST(NetworkInterface, that_does_not_exist_is_refused_with_those_that_do) {
   Config config = own_domain();
   config.network_interface = "wlan77";

@@ -32,7 +32,7 @@ using Clock = std::chrono::steady_clock;
 namespace fs = std::filesystem;
 namespace topics = bus::topics;
 
-constexpr auto kPause = 1500ms;      ///< shorter than the bus's lease
+constexpr auto kPause = 500ms;       ///< shorter than a supervisor's patience (--still)
 constexpr double kWatched_s = 10.0;  ///< after a blow
 constexpr auto kHangFound = 25s;     ///< more than any watchdog's patience
 constexpr auto kFirstWord = 120s;
@@ -203,7 +203,7 @@ void score(const std::string& session, DriveResult& result) {
 }  // namespace
 
 const char* name_of(Kind kind) {
-  return kind == Kind::kKill ? "kill -9" : kind == Kind::kPause ? "stop 1.5 s" : "hang";
+  return kind == Kind::kKill ? "kill -9" : kind == Kind::kPause ? "stop 0.5 s" : "hang";
 }
 
 DriveResult drive(const DriveSettings& settings, const std::vector<Blow>& blows) {

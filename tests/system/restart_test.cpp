@@ -19,6 +19,9 @@ using ::testing::IsEmpty;
 using namespace tests;
 
 constexpr double kPickUp_s = 2.0;  // issue
+/// From the moment at which a mapper stops to its successor's first word: 1.3 to 1.9 s on a
+/// computer with much other work. With the patience of 3 s that who works has, it cannot be.
+constexpr double kHang_s = 3.0;
 /// As long as the gate waits for a mapper (fusion_gate.lio_timeout_s), and some.
 constexpr double kOthersGap_s = 1.5;
 constexpr double kGoodGps_m = 0.15;      // issue: RMSE while GPS is good
@@ -28,14 +31,17 @@ TEST(Restart, of_each_process_in_one_drive_leaves_the_others_alone_and_the_sessi
   const TemporaryFolder folder;
   DriveSettings settings;
   settings.scenario = "campus";
-  settings.duration_s = 34.0;
+  settings.duration_s = 46.0;
   settings.domain = own_domain(30);
   settings.session = folder.path("session");
-  const DriveResult result = drive(
-      settings,
-      {{11.0, kMapper, Kind::kKill}, {18.0, kGate, Kind::kKill}, {25.0, kFilter, Kind::kKill}});
+  // The hang comes after the ten seconds in which the others are watched.
+  const DriveResult result = drive(settings,
+                                   {{11.0, kMapper, Kind::kKill},
+                                    {18.0, kGate, Kind::kKill},
+                                    {25.0, kFilter, Kind::kKill},
+                                    {36.0, kMapper, Kind::kHang}});
   EXPECT_EQ(result.exit_code, 0) << result.output;
-  ASSERT_EQ(result.blows.size(), 3U) << result.output;
+  ASSERT_EQ(result.blows.size(), 4U) << result.output;
   for (const BlowResult& one : result.blows) {
     std::printf("%s: down %.2f s, heard %.2f s after its start; the others silent for %.2f s\n",
                 one.blow.process.c_str(),
@@ -46,6 +52,7 @@ TEST(Restart, of_each_process_in_one_drive_leaves_the_others_alone_and_the_sessi
     EXPECT_LT(one.pick_up_s, kPickUp_s) << one.blow.process;
     EXPECT_LT(one.others_gap_s, kOthersGap_s) << one.blow.process;
   }
+  EXPECT_LT(result.blows.back().down_s, kHang_s);
   EXPECT_LT(result.rmse_m, kGoodGps_m);
   EXPECT_GT(result.map_points, 100'000U);
   EXPECT_GE(result.scans_listed + kUncounted + result.scans_done, result.scans_played);
@@ -55,7 +62,8 @@ TEST(Restart, of_each_process_in_one_drive_leaves_the_others_alone_and_the_sessi
               AllOf(HasSubstr("trigpoint_lio_mapper was killed by signal 9"),
                     HasSubstr("trigpoint_fusion_gate was killed by signal 9"),
                     HasSubstr("trigpoint_gps_eskf18 was killed by signal 9"),
-                    HasSubstr("processes failed 3 times")));
+                    HasSubstr("trigpoint_lio_mapper has not answered for 0.8 s"),
+                    HasSubstr("processes failed 4 times")));
   EXPECT_THAT(read_file(settings.session + "/report.md"),
               AllOf(HasSubstr("## Restarts"), HasSubstr("Scans missed: ")));
   EXPECT_THAT(read_file(settings.session + "/logs/trigpoint_lio_mapper.log"),

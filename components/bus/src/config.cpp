@@ -72,6 +72,12 @@ void describe(Config& config, ConfigFields& fields) {
                 config.lease_s,
                 "a process that is silent for so long counts as gone",
                 {0.5, 100.0});
+  fields.flag(
+      "shared_memory",
+      config.shared_memory,
+      "also shared memory between processes of one computer and one user; Fast DDS only, and "
+      "for all of them or none. After a kill -9 the others are silent for 2 to 4 s, and "
+      "files stay in /dev/shm");
   fields.text("security_folder",
               config.security_folder,
               "DDS-Security with the credentials that bringup/make-credentials has put there; "

@@ -2,23 +2,30 @@
 // Copyright the Trigpoint developers
 #pragma once
 
-#include "trigpoint/base/bounded_queue.hpp"
 #include "trigpoint/lio_mapper/cloud_decoder.hpp"
 
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
 #include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <mutex>
 #include <optional>
 #include <thread>
 #include <utility>
+#include <vector>
 
 namespace trigpoint::lio_mapper {
 
-/// Decodes clouds on a thread of its own, in the order in which they came, while the mapper matches
-/// the ones before.
+/// Decodes clouds, in the order in which they came, on a thread of its own while the mapper matches
+/// the ones before. A mapper that waits for a cloud decodes it itself: nothing is handed from
+/// thread to thread then, and the points are in its processor's cache.
 class DecodeAhead {
  public:
   /// So many decoded clouds may wait for the mapper; then add() waits.
   DecodeAhead(const Config& config, std::size_t most)
-      : decoder_(config), decoded_(most), thread_([this] { decode(); }) {}
+      : decoder_(config), most_(std::max<std::size_t>(most, 1)), thread_([this] { work(); }) {}
 
   ~DecodeAhead() {
     stop();
@@ -29,31 +36,115 @@ class DecodeAhead {
   DecodeAhead& operator=(const DecodeAhead&) = delete;
 
   /// False when it was stopped.
-  bool add(PointCloudMessage cloud) { return raw_.push(std::move(cloud)); }
-
-  /// The oldest one; waits until it is decoded. One call for each add().
-  std::optional<DecodedCloud> take() { return decoded_.pop(); }
-
-  /// Nobody takes any more: wakes who waits in add().
-  void stop() {
-    raw_.close();
-    decoded_.close();
+  bool add(PointCloudMessage cloud) {
+    std::unique_lock lock(mutex_);
+    room_.wait(lock, [this] { return stopped_ || raw_.size() < kRaw; });
+    if (stopped_) {
+      return false;
+    }
+    raw_.push_back({std::move(cloud), Clock::now() + kLeftToTheMapper});
+    work_.notify_one();
+    return true;
   }
 
- private:
-  static constexpr std::size_t kRaw = 2;  ///< beside the one in work
-
-  void decode() {
-    while (auto cloud = raw_.pop()) {
-      if (!decoded_.push(decoder_.decode(*cloud))) {
-        return;
+  /// The oldest one; waits until it is decoded. One call for each add().
+  std::optional<DecodedCloud> take() {
+    std::unique_lock lock(mutex_);
+    for (;;) {
+      if (!decoded_.empty()) {
+        std::optional<DecodedCloud> oldest(std::move(decoded_.front()));
+        decoded_.pop_front();
+        work_.notify_one();
+        return oldest;
+      }
+      if (stopped_) {
+        return std::nullopt;
+      }
+      if (!decoding_ && !raw_.empty()) {
+        decode_front(lock);
+      } else {
+        ready_.wait(lock);
       }
     }
   }
 
+  /// The bytes of a cloud that was decoded, or none: with memory that is there already, the next
+  /// one arrives without a page fault for each of its pages.
+  std::vector<std::uint8_t> take_spare_bytes() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(spare_, {});
+  }
+
+  /// Nobody takes any more: wakes who waits in add().
+  void stop() {
+    {
+      const std::lock_guard lock(mutex_);
+      stopped_ = true;
+    }
+    work_.notify_all();
+    room_.notify_all();
+    ready_.notify_all();
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  static constexpr std::size_t kRaw = 2;  ///< beside the one in work
+  /// A mapper that has not come for it by then is busy with a scan.
+  static constexpr std::chrono::milliseconds kLeftToTheMapper{2};
+  /// Who sends larger clouds, or one such, does not make us keep its memory.
+  static constexpr std::size_t kMostSpare_bytes = 16'000'000;
+
+  struct Raw {
+    PointCloudMessage cloud;
+    Clock::time_point due;
+  };
+
+  void work() {
+    std::unique_lock lock(mutex_);
+    while (!stopped_) {
+      if (decoding_ || raw_.empty() || decoded_.size() >= most_) {
+        work_.wait(lock);
+      } else if (const Clock::time_point due = raw_.front().due; Clock::now() < due) {
+        work_.wait_until(lock, due);
+      } else {
+        decode_front(lock);
+      }
+    }
+  }
+
+  /// By one thread at a time, so that clouds stay in order.
+  void decode_front(std::unique_lock<std::mutex>& lock) {
+    decoding_ = true;
+    PointCloudMessage cloud = std::move(raw_.front().cloud);
+    raw_.pop_front();
+    lock.unlock();
+    room_.notify_one();
+    const Clock::time_point before = Clock::now();
+    DecodedCloud decoded = decoder_.decode(cloud);
+    decoded.set_decoding_ms(
+        std::chrono::duration<double, std::milli>(Clock::now() - before).count());
+    lock.lock();
+    decoding_ = false;
+    decoded_.push_back(std::move(decoded));
+    if (cloud.data.capacity() <= kMostSpare_bytes) {
+      spare_ = std::move(cloud.data);
+    }
+    ready_.notify_one();
+    work_.notify_one();
+  }
+
   CloudDecoder decoder_;
-  BoundedQueue<PointCloudMessage> raw_{kRaw};
-  BoundedQueue<DecodedCloud> decoded_;
+  const std::size_t most_;
+  std::mutex mutex_;
+  std::condition_variable work_;   ///< for the thread
+  std::condition_variable room_;   ///< for add()
+  std::condition_variable ready_;  ///< for take()
+  std::deque<Raw> raw_;
+  std::deque<DecodedCloud> decoded_;
+  std::vector<std::uint8_t> spare_;
+  bool decoding_{false};
+  bool stopped_{false};
   std::thread thread_;  ///< last: it uses the others
 };
 

@@ -38,6 +38,8 @@ constexpr int kPastNiceness = 10;
 /// Silence that a supervisor is asked for: finding the place in the map again is one long piece of
 /// work.
 constexpr std::chrono::seconds kSearching{20};
+/// And a disk that lags far behind, for which odometry waits.
+constexpr std::chrono::seconds kWaitingForTheDisk{60};
 
 constexpr std::chrono::seconds kMapPeriod{5};  ///< the latched local map, while somebody listens
 
@@ -123,6 +125,7 @@ class Process {
                       if (decoding_.add(bus::from_message(std::move(m)))) {
                         loop.post([this] { take_cloud(); });
                       }
+                      m.data(decoding_.take_spare_bytes());
                     });
     loop.every(std::chrono::seconds(1), [this] { report_health(); });
     loop.every(kMapPeriod, [this] { publish_map(); });
@@ -182,8 +185,12 @@ class Process {
     const bool searching = core_.status().health != LioHealth::kOk;
     if (searching != searching_) {
       searching_ = searching;
-      searching ? notice_.allow_silence(kSearching) : notice_.allow_usual_silence();
+      allow_silence();
     }
+  }
+
+  void allow_silence() {
+    searching_ ? notice_.allow_silence(kSearching) : notice_.allow_usual_silence();
   }
 
   template <typename Feed>
@@ -195,7 +202,7 @@ class Process {
         std::chrono::duration<double, std::milli>(Clock::now() - before).count();
     log_(output.events);
     for (lio_mapper::ScanResult& scan : output.scans) {
-      scan.status.scan_ms = elapsed_ms / static_cast<double>(output.scans.size());
+      scan.status.scan_ms += elapsed_ms / static_cast<double>(output.scans.size());
       publish(scan);
       keep([this, kept = std::make_shared<const lio_mapper::ScanResult>(std::move(scan))] {
         session_->on_scan(*kept);
@@ -273,7 +280,9 @@ class Process {
     if (!session_) {
       return;
     }
-    if (writing_.is_full()) {
+    const bool must_wait = writing_.is_full();
+    if (must_wait) {
+      notice_.allow_silence(kWaitingForTheDisk);
       log_({Severity::kWarning,
             last_.stamp_ns,
             "disk_lags",
@@ -281,6 +290,9 @@ class Process {
                 " scans behind; odometry waits for it, so that no keyframe is lost"});
     }
     writing_.give([this, write = std::move(write)] { disk_.keep(write); });
+    if (must_wait) {
+      allow_silence();
+    }
   }
 
   shell::EventLog log_;

@@ -14,6 +14,12 @@ DecodedCloud::DecodedCloud(DecodedCloud&&) noexcept = default;
 DecodedCloud& DecodedCloud::operator=(DecodedCloud&&) noexcept = default;
 DecodedCloud::~DecodedCloud() = default;
 
+void DecodedCloud::set_decoding_ms(double decoding_ms) {
+  if (auto* sweep = std::get_if<Sweep>(&content_->sweep)) {
+    sweep->decoding_ms = decoding_ms;
+  }
+}
+
 struct CloudDecoder::Impl {
   SweepDecoder sweeps;
 };

@@ -291,6 +291,7 @@ void LioMapper::Impl::report(const ScanOutcome& outcome, Output& output) {
   status.observability = outcome.observability;
   refresh_status();
   result.status = status;
+  result.status.scan_ms = sweeps.front().decoding_ms;
   result.points_odom = transformed(outcome.thinned_base, state.T_odom_base);
   if (outcome.used && !stored_points &&
       keyframe_trigger.fires(filter->stamp_ns(), state.T_odom_base)) {

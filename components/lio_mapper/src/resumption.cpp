@@ -31,6 +31,12 @@ constexpr double kVelocitySigma_mps = 0.2;
 /// The heading's rate while nobody looked is taken from so much of the IMU after it.
 constexpr double kTurnWindow_s = 0.2;
 constexpr double kTurned_rad = 0.2;
+/// It may have begun or ended to turn meanwhile: headings on the way to the predicted one and so
+/// far beyond are looked at too, as far apart as a registration finds its way between.
+constexpr double kTurnedBeyond_rad = 0.2;
+constexpr double kTurnedStep_rad = 0.08;
+/// A map that was loaded around one place serves those so near to it as well.
+constexpr double kSameMap_m = 5.0;
 /// Of a registered pose, before the first scan is matched.
 constexpr double kPositionSigma_m = 0.1;
 constexpr double kRotationSigma_rad = 0.01;
@@ -163,24 +169,33 @@ std::vector<SearchArea> Resumption::areas(Nanoseconds now_ns,
   const double turned_rad = away_s * turn_radps;
   SearchArea at_checkpoint{{last * T_first_newest}, radius_m, yaw_rad};
   if (away_s < kLongestDrive_s && (driven_m.norm() > 1.0 || std::abs(turned_rad) > kTurned_rad)) {
-    const SearchArea predicted = predicted_place(now_ns, turn_radps, T_first_newest);
-    at_checkpoint.centres_odom.push_back(predicted.centres_odom.front());
+    at_checkpoint.centres_odom.push_back(predicted_place(away_s, turned_rad, T_first_newest));
   }
   result.push_back(std::move(at_checkpoint));
   return result;
 }
 
-SearchArea Resumption::predicted_place(Nanoseconds now_ns,
-                                       double turn_radps,
-                                       const Pose& T_first_newest) const {
+Pose Resumption::predicted_place(double away_s,
+                                 double turned_rad,
+                                 const Pose& T_first_newest) const {
   const Pose& last = checkpoint_.T_odom_base;
-  const double away_s = std::max(0.0, to_seconds(now_ns - checkpoint_.stamp_ns));
   const Vector3d driven_m = away_s * checkpoint_.v_odom_mps;
-  const double turned_rad = away_s * turn_radps;
   // Along an arc, whose chord points half way between the headings.
   const Pose predicted((from_yaw(turned_rad) * last.q).normalized(),
                        last.p + from_yaw(0.5 * turned_rad) * driven_m);
-  return {{predicted * T_first_newest}, 0.0, 0.0};
+  return predicted * T_first_newest;
+}
+
+SearchArea Resumption::other_turns(double away_s,
+                                   double turned_rad,
+                                   const Pose& T_first_newest) const {
+  SearchArea area;
+  const double most_rad = std::max(0.0, turned_rad) + kTurnedBeyond_rad;
+  for (double other_rad = std::min(0.0, turned_rad) - kTurnedBeyond_rad; other_rad <= most_rad;
+       other_rad += kTurnedStep_rad) {
+    area.centres_odom.push_back(predicted_place(away_s, other_rad, T_first_newest));
+  }
+  return area;
 }
 
 /// A start that takes attitude, speed and biases from the checkpoint, in level axes of its own.
@@ -282,8 +297,12 @@ std::optional<Resumption::Found> Resumption::attempt_at_once(const Pose& T_base_
   const LevelScan scan{gathered.points_base, without_yaw(gathered.T_new_base.q), T_base_lidar.p};
   const double turn_radps = turn_rate_radps(imu, start, checkpoint_.gyro_bias_radps);
   const Pose T_first_newest = start.initial.state.T_odom_base.inverse() * gathered.T_new_base;
-  return look_in(
-      {predicted_place(stamp_ns, turn_radps, T_first_newest)}, start, scan, gathered.T_new_base);
+  const double turned_rad = away_s * turn_radps;
+  return look_in({{{predicted_place(away_s, turned_rad, T_first_newest)}},
+                  other_turns(away_s, turned_rad, T_first_newest)},
+                 start,
+                 scan,
+                 gathered.T_new_base);
 }
 
 std::optional<Resumption::Found> Resumption::look_in(const std::vector<SearchArea>& areas,
@@ -291,12 +310,15 @@ std::optional<Resumption::Found> Resumption::look_in(const std::vector<SearchAre
                                                      const LevelScan& scan,
                                                      const Pose& T_new_base) {
   Workers workers(static_cast<std::size_t>(config_.matching.threads));
+  std::unique_ptr<LocalMap> map;
+  Vector3d loaded_at_m = Vector3d::Zero();
   for (const SearchArea& area : areas) {
-    auto map = load_map(config_.local_map,
-                        points_,
-                        checkpoint_.odom_epoch,
-                        area.centres_odom.front().p,
-                        !options_.frozen_map);
+    const Vector3d& centre_m = area.centres_odom.front().p;
+    if (!map || (centre_m - loaded_at_m).norm() > kSameMap_m) {
+      map = load_map(
+          config_.local_map, points_, checkpoint_.odom_epoch, centre_m, !options_.frozen_map);
+      loaded_at_m = centre_m;
+    }
     const RegistrationResult result =
         register_scan(scan, *map, area, config_.matching, config_.recovery, workers);
     if (result.accepted) {

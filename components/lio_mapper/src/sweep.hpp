@@ -29,6 +29,7 @@ struct Sweep {
   std::vector<TimedPoint> points;
   std::size_t points_received{0};
   std::size_t points_refused{0};  ///< not finite or out of range
+  double decoding_ms{0.0};        ///< as the shell measured it
 };
 
 /// Why a cloud was refused: a short stable code and a sentence with field, value and what was

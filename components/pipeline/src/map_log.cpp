@@ -64,7 +64,7 @@ class Session {
   /// Returns at once unless the disk lags far behind; throws when it has refused something.
   void on_step(Step&& step, const Lockstep& cores, double step_ms) {
     for (lio_mapper::ScanResult& scan : step.scans) {
-      scan.status.scan_ms = step_ms / static_cast<double>(step.scans.size());
+      scan.status.scan_ms += step_ms / static_cast<double>(step.scans.size());
     }
     keep_datum(cores);
     const bool judged = !step.fusion_status.empty();

@@ -2,12 +2,15 @@
 // Copyright the Trigpoint developers
 #include "read_ahead.hpp"
 
+#include <chrono>
 #include <utility>
 #include <variant>
 
 namespace trigpoint::pipeline {
 
 namespace {
+
+using Clock = std::chrono::steady_clock;
 
 /// Entries: two to six sweeps with the IMU samples between them.
 constexpr std::size_t kAhead = 64;
@@ -61,7 +64,10 @@ ReadAhead::Item ReadAhead::prepared(recording::LogEntry&& entry) {
   item.progress = log_.progress();
   auto* cloud = std::get_if<PointCloudMessage>(&item.entry.measurement);
   if (cloud != nullptr && !item.entry.withheld) {
+    const Clock::time_point before = Clock::now();
     item.decoded = decoder_.decode(*cloud);
+    item.decoded->set_decoding_ms(
+        std::chrono::duration<double, std::milli>(Clock::now() - before).count());
     cloud->data = {};
   }
   return item;

@@ -5,6 +5,7 @@
 
 #include "child.hpp"
 #include "notify_socket.hpp"
+#include "stillness.hpp"
 #include <CLI/CLI.hpp>
 #include <poll.h>
 #include <sys/signalfd.h>
@@ -30,7 +31,8 @@ using namespace trigpoint::supervisor;
 using Clock = std::chrono::steady_clock;
 
 constexpr double kHeldUp_s = 1.0;  ///< a supervisor that woke so late cannot blame its program
-constexpr int kTick_ms = 200;
+constexpr int kTick_ms = 100;
+constexpr int kStillLooks = 3;  ///< one a tick: by then a late timer would have woken it
 
 struct Options {
   std::string name;
@@ -38,6 +40,7 @@ struct Options {
   std::string records_file;
   std::string pid_file;
   double watchdog_s{3.0};
+  double still_s{0.0};
   double stop_timeout_s{30.0};
   std::vector<std::string> command;
 };
@@ -121,9 +124,27 @@ class Supervisor {
     return std::nullopt;
   }
 
+  /// Who works may be late, on a loaded computer by seconds; who stands still without having asked
+  /// for patience is not.
+  double patience_with_its_silence_s() {
+    if (is_closing_) {
+      return options_.stop_timeout_s;
+    }
+    const bool asked_for_more = watchdog_s_ > options_.watchdog_s;
+    if (!answered_ || options_.still_s <= 0.0 || asked_for_more) {
+      return watchdog_s_;
+    }
+    const bool is_silent = seconds_since(*answered_) > 0.5 * options_.still_s;
+    if (!is_silent) {
+      stillness_.forget();
+    }
+    const bool is_still = is_silent && stillness_.looks_at(child_) >= kStillLooks;
+    return is_still ? std::min(options_.still_s, watchdog_s_) : watchdog_s_;
+  }
+
   /// Kills what no longer answers, or does not stop.
   void insist() {
-    const double patience_s = is_closing_ ? options_.stop_timeout_s : watchdog_s_;
+    const double patience_s = patience_with_its_silence_s();
     const bool hangs = answered_ && !stopping_since_ && options_.watchdog_s > 0.0 &&
                        seconds_since(*answered_) > patience_s;
     const bool lingers =
@@ -145,6 +166,7 @@ class Supervisor {
     watchdog_s_ = options_.watchdog_s;
     is_closing_ = false;
     hung_ = false;
+    stillness_.forget();
     if (!options_.pid_file.empty()) {
       // Whole or not at all: others read it at any moment.
       const std::string beside = options_.pid_file + ".part";
@@ -219,6 +241,7 @@ class Supervisor {
   Options options_;
   RestartPolicy policy_;
   NotifySocket notices_;
+  Stillness stillness_;
   int signals_{-1};
   pid_t child_{-1};
   Clock::time_point started_;
@@ -249,6 +272,14 @@ int main(int argc, char** argv) {
   app.add_option("--watchdog",
                  options.watchdog_s,
                  "s without a WATCHDOG=1 (sd_notify) after which it hangs; 0: never")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
+  app.add_option(
+         "--still",
+         options.still_s,
+         "the same for a program whose main thread is stopped or asleep, unless it has asked "
+         "for more patience (WATCHDOG_USEC=); shorter than --watchdog, and several times as "
+         "long as it usually is silent; 0: no difference")
       ->capture_default_str()
       ->check(CLI::NonNegativeNumber);
   app.add_option("--stop-timeout", options.stop_timeout_s, "s that it has for stopping")

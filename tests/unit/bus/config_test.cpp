@@ -41,7 +41,8 @@ TEST(BusConfig, reads_every_field) {
   load_config_text(
       "domain_id: 3\nnetwork_interface: lo\ninitial_peers: [10.0.0.2]\n"
       "socket_buffer_bytes: 212992\ndatagram_bytes: 1472\nheartbeat_s: 0.05\nlease_s: 5\n"
-      "discovery_server: \"10.0.0.1:11811\"\nbulk_bytes_per_s: 5000000\nsecurity_folder: keys\n",
+      "discovery_server: \"10.0.0.1:11811\"\nbulk_bytes_per_s: 5000000\nsecurity_folder: keys\n"
+      "shared_memory: true\n",
       "test",
       [&](ConfigFields& fields) { describe(config, fields); });
   EXPECT_EQ(config.domain_id, 3);
@@ -54,6 +55,8 @@ TEST(BusConfig, reads_every_field) {
   EXPECT_EQ(config.discovery_server, "10.0.0.1:11811");
   EXPECT_EQ(config.bulk_bytes_per_s, 5'000'000);
   EXPECT_EQ(config.security_folder, "keys");
+  EXPECT_FALSE(Config{}.shared_memory);
+  EXPECT_TRUE(config.shared_memory);
 }
 
 TEST(TopicName, is_the_ros_name_behind_rt) {

@@ -4,6 +4,7 @@
 // writing.
 #include "decode_ahead.hpp"
 
+#include "trigpoint/base/bounded_queue.hpp"
 #include "trigpoint/base/serial_worker.hpp"
 #include "trigpoint/lio_mapper/lio_mapper.hpp"
 
@@ -134,6 +135,60 @@ TEST(DecodeAheadThread, lets_go_of_who_waits_to_hand_a_cloud_over_when_it_is_sto
   });
   decoding.stop();
   waiting.get();
+}
+
+TEST(DecodeAheadThread, decodes_by_itself_while_the_mapper_is_busy) {
+  DecodeAhead decoding({}, 1);
+  PointCloudMessage cloud = RoomDrive().sweep_at(RoomDrive::kEpoch_ns, 10);
+  ASSERT_TRUE(decoding.add(cloud));
+  std::vector<std::uint8_t> spare;  // there once it is decoded, and nobody has asked for it
+  while ((spare = decoding.take_spare_bytes()).capacity() == 0) {
+    std::this_thread::yield();
+  }
+  EXPECT_TRUE(decoding.take().has_value());
+}
+
+TEST(DecodeAheadThread, gives_the_memory_of_a_decoded_cloud_back_unless_it_is_large) {
+  DecodeAhead decoding({}, 1);
+  const PointCloudMessage cloud = RoomDrive().sweep_at(RoomDrive::kEpoch_ns, 10);
+  for (const std::size_t bytes : {std::size_t{1'000'000}, std::size_t{20'000'000}}) {
+    PointCloudMessage given = cloud;
+    given.data.reserve(bytes);
+    const std::uint8_t* memory = given.data.data();
+    ASSERT_TRUE(decoding.add(std::move(given)));
+    ASSERT_TRUE(decoding.take().has_value());
+    const std::vector<std::uint8_t> spare = decoding.take_spare_bytes();
+    EXPECT_EQ(spare.data() == memory, bytes < 16'000'000U);
+    EXPECT_EQ(decoding.take_spare_bytes().capacity(), 0U);
+  }
+}
+
+TEST(DecodedCloud, says_in_its_scans_status_how_long_its_decoding_took) {
+  LioMapper mapper({}, RobotConfig{});
+  CloudDecoder decoder({});
+  double decoding_ms = 0.0;
+  std::vector<double> told_ms;
+  const auto note = [&](const Output& output) {
+    for (const ScanResult& scan : output.scans) {
+      told_ms.push_back(scan.status.scan_ms);
+    }
+  };
+  for (const Input& input : inputs()) {
+    if (const auto* imu = std::get_if<ImuSample>(&input)) {
+      note(mapper.on_imu(*imu));
+    } else {
+      DecodedCloud cloud = decoder.decode(std::get<PointCloudMessage>(input));
+      cloud.set_decoding_ms(decoding_ms += 1.0);
+      note(mapper.on_decoded_cloud(std::move(cloud)));
+    }
+  }
+  ASSERT_GE(told_ms.size(), 25U);
+  // The third cloud is none; the others come out in their order.
+  EXPECT_EQ(told_ms[0], 1.0);
+  EXPECT_EQ(told_ms[1], 2.0);
+  for (std::size_t i = 2; i < told_ms.size(); ++i) {
+    EXPECT_EQ(told_ms[i], static_cast<double>(i) + 2.0);
+  }
 }
 
 TEST(WritingBeside, a_disk_that_does_not_answer_delays_no_scan_and_loses_none) {

@@ -80,6 +80,39 @@ TEST(Resume, predicts_the_turn_that_the_robot_makes_meanwhile) {
   EXPECT_LT((resumed.scans.back().odometry.T_frame_child.p - undisturbed->p).norm(), kSameTrack_m);
 }
 
+/// Half a second of sweeps is less than an ordinary start needs: only who looks where the robot
+/// went is found.
+TEST(Resume, finds_at_once_who_began_or_ceased_to_turn_meanwhile) {
+  const ResumeDrive& drive = short_drive();
+  constexpr std::size_t kAway = 10;  // scans: one second
+  constexpr double kScan_s = 0.1;
+  const auto turned_rad = [&](std::size_t from, std::size_t to) {
+    return wrap_angle(yaw_of(drive.scans[to].odometry.T_frame_child.q) -
+                      yaw_of(drive.scans[from].odometry.T_frame_child.q));
+  };
+  /// Between the turn made and the one that the first moment afterwards tells.
+  const auto surprise_rad = [&](std::size_t i) {
+    const double rate_radps = turned_rad(i + kAway, i + kAway + 2) / (2 * kScan_s);
+    return std::abs(rate_radps * kAway * kScan_s - turned_rad(i, i + kAway));
+  };
+  std::size_t stop = 10;
+  for (std::size_t i = stop; i + 2 * kAway < drive.scans.size(); ++i) {
+    stop = surprise_rad(i) > surprise_rad(stop) ? i : stop;
+  }
+  ASSERT_GT(surprise_rad(stop), 0.2);
+  const auto& stopped = drive.scans[stop];
+  const auto resumed = resume(drive,
+                              stopped.checkpoint,
+                              drive.points_until(stopped.checkpoint.stamp_ns),
+                              stopped.checkpoint.stamp_ns + from_seconds(kAway * kScan_s),
+                              0.5);
+  ASSERT_TRUE(said(resumed.events, "lio_resumed"));
+  ASSERT_FALSE(resumed.scans.empty());
+  const Pose* undisturbed = drive.pose_at(resumed.scans.back().odometry.stamp_ns);
+  ASSERT_NE(undisturbed, nullptr);
+  EXPECT_LT((resumed.scans.back().odometry.T_frame_child.p - undisturbed->p).norm(), kSameTrack_m);
+}
+
 TEST(Resume, begins_a_new_epoch_where_the_map_is_of_another_place_and_loses_no_sweep) {
   const ResumeDrive& drive = short_drive();
   const auto& stopped = drive.scans.at(drive.scans.size() / 2);

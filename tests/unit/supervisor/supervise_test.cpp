@@ -57,6 +57,14 @@ class Supervise : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
+/// Says READY=1 once, then does something else. systemd-notify is not everywhere; python3 is, for
+/// the architecture tests.
+std::string promise_and(const std::string& deed) {
+  return "python3 -c 'import os,socket; s=socket.socket(socket.AF_UNIX,socket.SOCK_DGRAM); "
+         "s.sendto(b\"READY=1\",\"\\0\"+os.environ[\"NOTIFY_SOCKET\"][1:])'; " +
+         deed;
+}
+
 TEST_F(Supervise, starts_again_what_was_killed_and_says_so_everywhere) {
   Command supervisor(command("exec sleep 60"));
   ASSERT_TRUE(wait_for_lives(1));
@@ -87,13 +95,32 @@ TEST_F(Supervise, does_not_start_again_what_ended_well_or_was_configured_wrongly
 }
 
 TEST_F(Supervise, kills_and_restarts_what_promised_to_answer_and_does_not) {
-  // systemd-notify is not everywhere; python3 is, for the architecture tests.
-  const std::string promise =
-      "python3 -c 'import os,socket; s=socket.socket(socket.AF_UNIX,socket.SOCK_DGRAM); "
-      "s.sendto(b\"READY=1\",\"\\0\"+os.environ[\"NOTIFY_SOCKET\"][1:])'; exec sleep 60";
-  Command supervisor(command(promise, {"--watchdog", "0.5"}));
+  Command supervisor(command(promise_and("exec sleep 60"), {"--watchdog", "0.5"}));
   ASSERT_TRUE(wait_for_lives(2)) << supervisor.output_so_far();
   EXPECT_THAT(supervisor.output_so_far(), HasSubstr("has not answered for 0.5 s: killing it"));
+}
+
+TEST_F(Supervise, finds_out_sooner_about_what_stands_still) {
+  Command supervisor(command(promise_and("exec sleep 60"), {"--watchdog", "50", "--still", "0.5"}));
+  ASSERT_TRUE(wait_for_lives(2)) << supervisor.output_so_far();
+  EXPECT_THAT(supervisor.output_so_far(), HasSubstr("has not answered for 0.5 s: killing it"));
+}
+
+TEST_F(Supervise, finds_out_sooner_about_what_was_stopped) {
+  Command supervisor(
+      command(promise_and("while :; do :; done"), {"--watchdog", "50", "--still", "0.5"}));
+  ASSERT_TRUE(wait_for_lives(1));
+  std::this_thread::sleep_for(1s);
+  kill(child(), SIGSTOP);
+  ASSERT_TRUE(wait_for_lives(2)) << supervisor.output_so_far();
+}
+
+TEST_F(Supervise, has_more_patience_with_what_works) {
+  Command supervisor(
+      command(promise_and("while :; do :; done"), {"--watchdog", "50", "--still", "0.5"}));
+  ASSERT_TRUE(wait_for_lives(1));
+  std::this_thread::sleep_for(3s);
+  EXPECT_EQ(lives(), 1) << supervisor.output_so_far();
 }
 
 TEST_F(Supervise, has_as_much_patience_as_it_is_asked_for) {
@@ -102,7 +129,7 @@ TEST_F(Supervise, has_as_much_patience_as_it_is_asked_for) {
       "s.sendto(b\"WATCHDOG_USEC=30000000\\nWATCHDOG=1\",\"\\0\"+os.environ[\"NOTIFY_SOCKET\"][1:])"
       "'; "
       "exec sleep 60";
-  Command supervisor(command(ask, {"--watchdog", "0.3"}));
+  Command supervisor(command(ask, {"--watchdog", "0.3", "--still", "0.2"}));
   ASSERT_TRUE(wait_for_lives(1));
   std::this_thread::sleep_for(2s);
   EXPECT_EQ(lives(), 1) << supervisor.output_so_far();

@@ -136,9 +136,20 @@ std::string internal(const Config& config, const SocketBuffers& buffers) {
                      element("DefragUnreliableMaxSamples", kMostIncomplete) + repair_burst);
 }
 
+/// Cyclone DDS shares memory through iceoryx, and only messages of fixed size.
+void refuse_shared_memory(const Config& config) {
+  if (config.shared_memory) {
+    throw std::runtime_error(
+        "bus.shared_memory is true, and Cyclone DDS cannot do it: through its iceoryx daemon it "
+        "shares messages of fixed size only, and points and odometry are not; leave it false, or "
+        "take the programs that are built with Fast DDS");
+  }
+}
+
 }  // namespace
 
 std::string domain_config(const Config& config, const SocketBuffers& buffers) {
+  refuse_shared_memory(config);
   const std::string ours = element("CycloneDDS",
                                    "<Domain Id=\"any\">" + general(config) + discovery(config) +
                                        internal(config, buffers) + "</Domain>");

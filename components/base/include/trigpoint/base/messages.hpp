@@ -115,7 +115,8 @@ struct LioStatus {
   std::vector<NamedCount> scans_refused;  ///< by reason
   std::uint64_t imu_received{0};
   double distance_m{0.0};  ///< driven since the epoch began
-  double scan_ms{0.0};     ///< of the newest scan after its decoding, filled by the shell
+  /// Computing time of the newest scan, its decoding included; the shell measures it.
+  double scan_ms{0.0};
 };
 
 enum class AxisDecision : std::uint8_t { kLio, kFused, kCoast };

@@ -24,6 +24,7 @@ struct Config {
   std::int64_t bulk_bytes_per_s{0};     ///< of clouds, to everybody together; 0: no limit
   double heartbeat_s{0.05};             ///< how often a reliable writer asks what was lost
   double lease_s{2.0};                  ///< silence after which a process counts as gone
+  bool shared_memory{false};            ///< beside UDP, within one computer; Fast DDS only
   std::string security_folder;          ///< of bringup/make-credentials; empty: no security
 };
 

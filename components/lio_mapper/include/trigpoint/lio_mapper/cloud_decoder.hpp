@@ -18,6 +18,9 @@ class DecodedCloud {
   DecodedCloud& operator=(DecodedCloud&&) noexcept;
   ~DecodedCloud();
 
+  /// Told by the shell, which has a clock; LioStatus::scan_ms of its scan begins with it.
+  void set_decoding_ms(double decoding_ms);
+
  private:
   friend class LioMapper;
   std::unique_ptr<Content> content_;

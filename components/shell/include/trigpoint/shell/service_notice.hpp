@@ -12,8 +12,8 @@ namespace trigpoint::shell {
 /// nothing. To be used on the thread whose hanging is to be found out.
 class ServiceNotice {
  public:
-  /// How often alive() is expected; supervisors wait for several of them.
-  static constexpr std::chrono::seconds kPeriod{1};
+  /// How often alive() is said; supervisors wait for several of them (bringup/run: --still).
+  static constexpr std::chrono::milliseconds kPeriod{200};
 
   ServiceNotice();
   ~ServiceNotice();
