@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <functional>
+#include <optional>
 #include <sstream>
 
 namespace trigpoint::evaluation {
@@ -19,7 +20,8 @@ namespace file = exporter::session_file;
 
 constexpr int kWidth_px = 1500;
 constexpr double kMargin_m = 6.0;
-constexpr double kLeastPart_m = 15.0;  ///< half a side of the enlarged part
+constexpr double kLeastPart_m = 15.0;   ///< half a side of the part with the dropout
+constexpr double kLeastDetail_m = 0.3;  ///< and of that where modes differ
 constexpr std::size_t kMostPoints = 6'000;
 constexpr const char* kDropoutColour = "#ffdf3d";
 
@@ -55,18 +57,34 @@ struct Curve {
 struct Content {
   std::vector<Curve> curves;
   Trajectory truth;
-  Trajectory fixes;
+  Trajectory fixes;                ///< base_link at each: the lever arm taken off
   std::vector<FusionStatus> gate;  ///< of the last mode
   std::string gate_mode;
   Nanoseconds begin_ns{0};
 };
+
+/// The curves are of base_link, the fixes of an antenna that stands elsewhere: the difference would
+/// be taken for an error. With the attitude that the robot had at the fix.
+Trajectory at_base_link(const Trajectory& antenna,
+                        const Trajectory& fused,
+                        const Eigen::Vector3d& antenna_position_base_m) {
+  Trajectory base;
+  for (const auto& [stamp_ns, fix] : antenna) {
+    if (const auto pose = pose_at(fused, stamp_ns)) {
+      base.push_back({stamp_ns, Pose(pose->q, fix.p - pose->q * antenna_position_base_m)});
+    }
+  }
+  return base;
+}
 
 Content read(const ReproducedDrive& drive) {
   Content content;
   for (const ModeSessions& mode : drive.modes) {
     SessionData data = load_session(mode.fed, {});
     if (content.fixes.empty() && data.datum) {
-      content.fixes = fix_positions(data.fixes, *data.datum, FixChoice::kAll);
+      content.fixes = at_base_link(fix_positions(data.fixes, *data.datum, FixChoice::kAll),
+                                   data.fused,
+                                   data.antenna_position_base_m);
       content.truth = thinned(data.truth, kMostPoints);
       content.begin_ns = data.span().begin_ns;
     }
@@ -74,10 +92,9 @@ Content read(const ReproducedDrive& drive) {
     content.gate = std::move(data.gate);
     content.gate_mode = mode.mode;
   }
-  const bool is_empty =
-      std::all_of(content.curves.begin(), content.curves.end(), [](const Curve& curve) {
-        return curve.fused.empty();
-      });
+  const bool is_empty = std::all_of(content.curves.begin(),
+                                    content.curves.end(),
+                                    [](const Curve& curve) { return curve.fused.empty(); });
   if (is_empty) {
     throw std::runtime_error("there is no trajectory in map to draw");
   }
@@ -119,36 +136,52 @@ Square around(const Trajectory& trajectory, const Keep& keep) {
   Square square;
   if (lowest_m.x() <= highest_m.x()) {
     square.centre_m = 0.5 * (lowest_m + highest_m);
-    square.half_m =
-        std::max(kLeastPart_m, 0.5 * (highest_m - lowest_m).maxCoeff() + kMargin_m);
+    square.half_m = std::max(kLeastPart_m, 0.5 * (highest_m - lowest_m).maxCoeff() + kMargin_m);
   }
   return square;
 }
 
-/// The end of the longest dropout, where what was lost shows; without one, the place where a mode
-/// is furthest from the others' last.
-Square part_to_enlarge(const Content& content, const std::vector<Window>& dropouts) {
+Square around_longest(const Content& content, const std::vector<Window>& dropouts) {
+  const auto longest =
+      std::max_element(dropouts.begin(), dropouts.end(), [](const Window& a, const Window& b) {
+        return a.end_ns - a.begin_ns < b.end_ns - b.begin_ns;
+      });
+  return around(reference_curve(content).fused, [&](Nanoseconds stamp_ns) {
+    return stamp_ns >= longest->begin_ns && stamp_ns <= longest->end_ns;
+  });
+}
+
+/// Where a mode lies furthest beside the last one, seen from above.
+Square around_furthest(const Content& content) {
   const Trajectory& reference = reference_curve(content).fused;
-  if (!dropouts.empty()) {
-    const auto longest =
-        std::max_element(dropouts.begin(), dropouts.end(), [](const Window& a, const Window& b) {
-          return a.end_ns - a.begin_ns < b.end_ns - b.begin_ns;
-        });
-    return around(reference, [&](Nanoseconds stamp_ns) {
-      return stamp_ns >= longest->begin_ns && stamp_ns <= longest->end_ns;
-    });
-  }
-  double furthest_m = -1.0;
+  double furthest_m = 0.0;
   Square square;
-  for (const PosePair& pair : associate(content.curves.front().fused, reference).pairs) {
-    const double apart_m = (pair.estimate.p - pair.reference.p).norm();
-    if (apart_m > furthest_m) {
-      furthest_m = apart_m;
-      square.centre_m = pair.reference.p.head<2>();
+  for (const Curve& curve : content.curves) {
+    for (const PosePair& pair : associate(curve.fused, reference).pairs) {
+      const double apart_m = (pair.estimate.p - pair.reference.p).head<2>().norm();
+      if (apart_m >= furthest_m) {
+        furthest_m = apart_m;
+        square.centre_m = 0.5 * (pair.estimate.p + pair.reference.p).head<2>();
+      }
     }
   }
-  square.half_m = std::max(3.0, 3.0 * furthest_m);
+  square.half_m = std::max(kLeastDetail_m, 3.0 * furthest_m);
   return square;
+}
+
+/// What a panel shows; without a part the whole.
+struct Panel {
+  std::string title;
+  std::optional<Square> part;
+};
+
+std::vector<Panel> panels_of(const Content& content, const std::vector<Window>& dropouts) {
+  std::vector<Panel> panels{{"whole", std::nullopt}};
+  if (!dropouts.empty()) {
+    panels.push_back({"the longest dropout", around_longest(content, dropouts)});
+  }
+  panels.push_back({"where modes differ most", around_furthest(content)});
+  return panels;
 }
 
 class ReproductionPicture {
@@ -161,33 +194,32 @@ class ReproductionPicture {
         content_(content),
         picture_(exporter::path_in(folder, file::kPlots), name) {}
 
-  /// Fig. 7 to 10: the whole path, and a part of it enlarged; dropouts in yellow.
+  /// Fig. 7 to 10: the whole path, and parts of it enlarged; dropouts in yellow.
   std::string draw_trajectories(const std::string& gnuplot) const {
-    const Square part = part_to_enlarge(content_, figures_.dropouts);
+    const std::vector<Panel> panels = panels_of(content_, figures_.dropouts);
     std::ostringstream body;
     body << "set multiplot title '" << figures_.drive.name
-         << ": as published in map, no alignment (compare Fig. 7 to 10)'\n"
+         << ": as published in map, no alignment (compare Fig. 7 to 10)' noenhanced\n"
          << "set size ratio -1\nset grid lc rgb '#dddddd'\nset tics out nomirror\n"
-         << "set xlabel 'east [m]'\nset ylabel 'north [m]'\n"
-         << "set lmargin at screen 0.05\nset rmargin at screen 0.52\nset bmargin at screen 0.2\n"
-         << "set tmargin at screen 0.92\nset key at screen 0.5,0.11 center top horizontal "
-            "maxrows 3 samplen 3 noenhanced\n"
-         << "set object 1 rectangle from " << corner(part, -1.0) << " to " << corner(part, 1.0)
-         << " fs empty border rgb '#333333' lw 1 front\n"
-         << plot("1:2", "plot", true) << "unset object 1\nset ylabel ''\nunset key\n"
-         << "set title 'enlarged'\nset lmargin at screen 0.57\nset rmargin at screen 0.99\n"
-         << "set xrange [" << part.centre_m.x() - part.half_m << ":"
-         << part.centre_m.x() + part.half_m << "]\nset yrange [" << part.centre_m.y() - part.half_m
-         << ":" << part.centre_m.y() + part.half_m << "]\n"
-         << plot("1:2", "plot", false) << "unset multiplot\n";
-    return picture_.draw(gnuplot, kWidth_px, 850, body.str());
+         << "set xlabel 'east [m]'\nset ylabel 'north [m]' offset 1,0\n"
+         << "set bmargin at screen 0.24\nset tmargin at screen 0.88\n"
+         << "set key at screen 0.5,0.13 center top horizontal maxrows 3 samplen 3 noenhanced\n";
+    const double width = 0.98 / static_cast<double>(panels.size());
+    for (std::size_t i = 0; i < panels.size(); ++i) {
+      const double left = 0.01 + width * static_cast<double>(i);
+      body << "set title '" << panels[i].title << "'\nset lmargin at screen " << left + 0.045
+           << "\nset rmargin at screen " << left + width - 0.01 << "\n"
+           << range_of(panels[i].part) << plot("1:2", "plot", i == 0) << "unset key\n";
+    }
+    body << "unset multiplot\n";
+    return picture_.draw(gnuplot, kWidth_px, 700, body.str());
   }
 
   /// Fig. 11: the path in space, and the uncertainty of each axis with its threshold.
   std::string draw_uncertainty(const std::string& gnuplot) const {
     std::ostringstream body;
     body << "set multiplot title '" << figures_.drive.name
-         << ": path in space and uncertainty of the GPS odometry (compare Fig. 11)'\n"
+         << ": path in space and uncertainty of the GPS odometry (compare Fig. 11)' noenhanced\n"
          << "set origin 0,0.5\nset size 1,0.47\nset key at screen 0.985,0.93 right top samplen 3 "
             "noenhanced\nset view 62,32\nset ticslevel 0.05\nset xyplane relative 0.05\n"
          << "set grid lc rgb '#dddddd'\nset xlabel 'east [m]'\nset ylabel 'north [m]'\n"
@@ -199,18 +231,22 @@ class ReproductionPicture {
     for (std::size_t axis = 0; axis < kAxisNames.size(); ++axis) {
       const double top = 0.475 - 0.145 * static_cast<double>(axis);
       body << "set tmargin at screen " << top << "\nset bmargin at screen " << top - 0.125 << "\n"
-           << (axis == 2 ? "set format x '%g'\nset xlabel 'time [s]'\n" : "")
-           << sigma_panel(axis);
+           << (axis == 2 ? "set format x '%g'\nset xlabel 'time [s]'\n" : "") << sigma_panel(axis);
     }
     body << "unset multiplot\n";
     return picture_.draw(gnuplot, 1300, 1250, body.str());
   }
 
  private:
-  static std::string corner(const Square& square, double sign) {
+  static std::string range_of(const std::optional<Square>& square) {
+    if (!square) {
+      return "";
+    }
+    const Eigen::Vector2d lowest_m = square->centre_m.array() - square->half_m;
+    const Eigen::Vector2d highest_m = square->centre_m.array() + square->half_m;
     std::ostringstream text;
-    text << square.centre_m.x() + sign * square.half_m << ","
-         << square.centre_m.y() + sign * square.half_m;
+    text << "set xrange [" << lowest_m.x() << ":" << highest_m.x() << "]\nset yrange ["
+         << lowest_m.y() << ":" << highest_m.y() << "]\n";
     return text.str();
   }
 
@@ -238,7 +274,7 @@ class ReproductionPicture {
     add("fixes.xyz",
         rows_of(content_.fixes),
         "points pt 6 ps 0.5 lc rgb '#9a9a9a'",
-        "GPS fixes (antenna)");
+        "GPS fixes, lever arm taken off");
     for (const Curve& curve : content_.curves) {
       add(curve.mode + ".xyz",
           rows_of(curve.fused),
