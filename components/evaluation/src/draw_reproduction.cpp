@@ -202,8 +202,8 @@ class ReproductionPicture {
          << ": as published in map, no alignment (compare Fig. 7 to 10)' noenhanced\n"
          << "set size ratio -1\nset grid lc rgb '#dddddd'\nset tics out nomirror\n"
          << "set xlabel 'east [m]'\nset ylabel 'north [m]' offset 1,0\n"
-         << "set bmargin at screen 0.24\nset tmargin at screen 0.88\n"
-         << "set key at screen 0.5,0.13 center top horizontal maxrows 3 samplen 3 noenhanced\n";
+         << "set bmargin at screen 0.3\nset tmargin at screen 0.88\n"
+         << "set key at screen 0.5,0.19 center top vertical maxrows 3 samplen 3 noenhanced\n";
     const double width = 0.98 / static_cast<double>(panels.size());
     for (std::size_t i = 0; i < panels.size(); ++i) {
       const double left = 0.01 + width * static_cast<double>(i);
