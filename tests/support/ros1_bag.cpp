@@ -2,7 +2,7 @@
 // Copyright the Trigpoint developers
 #include "ros1_bag.hpp"
 
-#include "ros1_messages.hpp"
+#include "as_ros1_messages.hpp"
 #include <rosbag/bag.h>
 
 namespace trigpoint::tests {

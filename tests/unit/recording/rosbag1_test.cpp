@@ -2,7 +2,7 @@
 // Copyright the Trigpoint developers
 #include "trigpoint/recording/log.hpp"
 
-#include "ros1_messages.hpp"
+#include "as_ros1_messages.hpp"
 #include "samples.hpp"
 #include "temporary_folder.hpp"
 #include <geometry_msgs/PoseWithCovariance.h>
