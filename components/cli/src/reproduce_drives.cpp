@@ -143,11 +143,8 @@ std::vector<DriveToRun> drives_of(const ReproduceOptions& options) {
     }
   }
   if (!options.small_campus.empty()) {
-    drives.push_back(bag_drive(options,
-                               options.small_campus,
-                               "lio_sam_campus",
-                               "recorded_small_campus",
-                               "Small Campus"));
+    drives.push_back(bag_drive(
+        options, options.small_campus, "lio_sam_campus", "recorded_small_campus", "Small Campus"));
   }
   if (!options.park.empty()) {
     drives.push_back(bag_drive(options, options.park, "lio_sam_park", "recorded_park", "Park"));

@@ -79,10 +79,9 @@ std::string paper_name_of(const std::string& mode) {
 }
 
 const Score& score_of(const Evaluation& evaluation, AlignmentKind kind) {
-  const auto found =
-      std::find_if(evaluation.scores.begin(), evaluation.scores.end(), [&](const Score& score) {
-        return score.alignment == kind;
-      });
+  const auto found = std::find_if(evaluation.scores.begin(),
+                                  evaluation.scores.end(),
+                                  [&](const Score& score) { return score.alignment == kind; });
   return found == evaluation.scores.end() ? evaluation.scores.front() : *found;
 }
 
