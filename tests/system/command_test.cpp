@@ -94,6 +94,7 @@ TEST(Command, every_verb_has_help) {
                            "live",
                            "evaluate",
                            "report",
+                           "reproduce",
                            "export",
                            "merge",
                            "gps-plots",

@@ -81,6 +81,7 @@ int main(int argc, char** argv) {
   cli::add_live(app, chosen);
   cli::add_evaluate(app, chosen);
   cli::add_report(app, chosen);
+  cli::add_reproduce(app, chosen);
   cli::add_export(app, chosen);
   cli::add_merge(app, chosen);
   cli::add_gps_plots(app, chosen);

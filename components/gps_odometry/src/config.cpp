@@ -15,8 +15,9 @@ void describe_output(Config& c, ConfigFields& f) {
       "filter",
       c.filter,
       "The filter of an offline run: ekf15 (the paper's states) or eskf18 (error-state INS); on "
-      "the bus each is a program of its own. ekf15_strict is the published filter, to compare with",
-      {"ekf15", "eskf18", "ekf15_strict"});
+      "the bus each is a program of its own. To compare with: ekf15_strict, the published filter, "
+      "and ekf15_lio_sam, the same with the settings that LIO-SAM ships",
+      {"ekf15", "eskf18", "ekf15_strict", "ekf15_lio_sam"});
   f.number("publish_rate_hz", c.publish_rate_hz, "Highest rate of gps/odometry (Hz)", kPositive);
   f.number("dead_reckoning_after_s",
            c.dead_reckoning_after_s,

@@ -80,11 +80,13 @@ std::unique_ptr<Filter> make_filter(const Config& config, const RobotConfig& rob
   if (config.filter == InsTracker::kSource) {
     return std::make_unique<BufferedFilter<InsTracker>>(config, robot);
   }
-  if (config.filter == StrictFilter::kSource) {
-    return std::make_unique<StrictFilter>(config, robot);
+  for (const StrictSettings& settings : {published_settings(), lio_sam_settings()}) {
+    if (config.filter == settings.name) {
+      return std::make_unique<StrictFilter>(config, robot, settings);
+    }
   }
   throw ConfigError("gps_odometry: there is no filter '" + config.filter +
-                    "', expected ekf15, eskf18 or ekf15_strict.");
+                    "', expected ekf15, eskf18, ekf15_strict or ekf15_lio_sam.");
 }
 
 }  // namespace trigpoint::gps_odometry

@@ -14,7 +14,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kTick_s = 1.0 / 30.0;  // the published default
 constexpr double kAttitudeSigma_rad = 0.035;
 constexpr double kLevelTau_s = 5.0;
 constexpr double kLongestLevelStep_s = 0.1;
@@ -36,11 +35,28 @@ Matrix3d variance(double sigma) {
 
 }  // namespace
 
-StrictFilter::StrictFilter(const Config& config, const RobotConfig& robot)
+StrictSettings published_settings() {
+  return {"ekf15_strict", 30.0, published_process_noise(), false};
+}
+
+StrictSettings lio_sam_settings() {
+  Vector15d q;
+  q << 1.0, 1.0, 10.0,    // position, m^2/s
+      0.03, 0.03, 0.1,    // attitude, rad^2/s
+      0.25, 0.25, 0.04,   // velocity, (m/s)^2/s
+      0.01, 0.01, 0.5,    // rates, (rad/s)^2/s
+      0.01, 0.01, 0.015;  // acceleration, (m/s^2)^2/s
+  return {"ekf15_lio_sam", 50.0, q, true};
+}
+
+StrictFilter::StrictFilter(const Config& config,
+                           const RobotConfig& robot,
+                           const StrictSettings& settings)
     : config_(config),
+      settings_(settings),
       lever_base_m_(robot.antenna_position_base_m),
       start_tracker_(config, lever_base_m_),
-      replay_(MooreStouch{}, kTick_s) {
+      replay_(MooreStouch{}, tick_s()) {
   start_.emplace(start_tracker_, from_seconds(config.rewind_s));
 }
 
@@ -64,7 +80,8 @@ void StrictFilter::begin() {
   MooreStouch seed;
   seed.x = start_->newest().filter.x;
   seed.P = start_->newest().filter.P;
-  replay_ = MooreStouchReplay(seed, kTick_s);
+  seed.process_noise_per_s = settings_.process_noise_per_s;
+  replay_ = MooreStouchReplay(seed, tick_s());
   up_base_ = from_roll_pitch_yaw(seed.x.segment<3>(kAttitude)).conjugate() * Vector3d::UnitZ();
 }
 
@@ -98,7 +115,7 @@ void StrictFilter::insert(const CheckedImu& imu) {
   sample.accel_covariance = variance(config_.accel_sigma_mps2);
   replay_.add(sample, {Eigen::Isometry3d::Identity(), of_imu()});
   imu_ns_ = track_.imu_ns = imu.stamp_ns;
-  if (to_seconds(imu.stamp_ns - tick_ns_) >= kTick_s) {
+  if (to_seconds(imu.stamp_ns - tick_ns_) >= tick_s()) {
     tick(imu.stamp_ns);
   }
 }
@@ -113,8 +130,11 @@ FixOutcome StrictFilter::insert(const MapFix& fix) {
   // As reported: the scale is a correction of ours.
   const double scale = fix.checked.assumed_covariance ? 1.0 : config_.fix_sigma_scale;
   const Matrix3d reported = fix.covariance_map_m2 / (scale * scale);
-  replay_.add(
-      PositionSample{fix.checked.stamp_ns, fix.antenna_map_m - R * lever_base_m_, reported});
+  Vector3d position_m = fix.antenna_map_m - R * lever_base_m_;
+  if (settings_.zero_altitude) {
+    position_m.z() = 0.0;
+  }
+  replay_.add(PositionSample{fix.checked.stamp_ns, position_m, reported});
   tick(std::max(*imu_ns_, fix.checked.stamp_ns));
   note_accepted(track_, fix);
   track_.accepted_antenna_map_m =

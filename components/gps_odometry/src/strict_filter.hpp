@@ -12,17 +12,28 @@
 
 namespace trigpoint::gps_odometry {
 
+/// What the published filter is set to.
+struct StrictSettings {
+  const char* name;  ///< as gps_odometry.filter names it
+  double rate_hz;    ///< ticks of its timer
+  Vector15d process_noise_per_s;
+  bool zero_altitude;  ///< every fix is taken to put base_link at the datum's height
+};
+
+/// Its own defaults.
+StrictSettings published_settings();
+/// What LIO-SAM ships for its bags (config/params.yaml, sections navsat and ekf_gps).
+StrictSettings lio_sam_settings();
+
 /// Until the heading is found this is ekf15, since the published filter cannot find one. From then
-/// on: 30 ticks a second; fixes are positions in the present state however late, without gate, the
-/// lever arm turned by the present attitude and subtracted; of the IMU roll, pitch, all rates and
-/// all accelerations; published process noise; P is published as it is.
+/// on: a tick every 1 / rate_hz; fixes are positions in the present state however late, without
+/// gate, the lever arm turned by the present attitude and subtracted; of the IMU roll, pitch, all
+/// rates and all accelerations; P is published as it is.
 class StrictFilter : public Filter {
  public:
-  static constexpr const char* kSource = "ekf15_strict";
+  StrictFilter(const Config& config, const RobotConfig& robot, const StrictSettings& settings);
 
-  StrictFilter(const Config& config, const RobotConfig& robot);
-
-  const char* source() const override { return kSource; }
+  const char* source() const override { return settings_.name; }
 
   void insert(const CheckedImu& imu) override;
   FixOutcome insert(const MapFix& fix) override;
@@ -56,6 +67,8 @@ class StrictFilter : public Filter {
   bool is_doubtful() const override { return false; }
 
  private:
+  double tick_s() const { return 1.0 / settings_.rate_hz; }
+
   bool is_running() const { return track_.phase == Phase::kRunning; }
 
   Vector15d& x() { return replay_.filter().x; }
@@ -70,6 +83,7 @@ class StrictFilter : public Filter {
   Eigen::Quaterniond level(const CheckedImu& imu);
 
   Config config_;
+  StrictSettings settings_;
   Eigen::Vector3d lever_base_m_;
   EkfTracker start_tracker_;
   std::optional<RewindBuffer<EkfTracker>> start_;

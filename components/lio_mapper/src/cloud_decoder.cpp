@@ -10,6 +10,14 @@ namespace trigpoint::lio_mapper {
 
 DecodedCloud::DecodedCloud(std::unique_ptr<Content> content) : content_(std::move(content)) {}
 
+DecodedCloud::DecodedCloud(const DecodedCloud& other)
+    : content_(std::make_unique<Content>(*other.content_)) {}
+
+DecodedCloud& DecodedCloud::operator=(const DecodedCloud& other) {
+  content_ = std::make_unique<Content>(*other.content_);
+  return *this;
+}
+
 DecodedCloud::DecodedCloud(DecodedCloud&&) noexcept = default;
 DecodedCloud& DecodedCloud::operator=(DecodedCloud&&) noexcept = default;
 DecodedCloud::~DecodedCloud() = default;

@@ -4,13 +4,12 @@
 
 #include "trigpoint/base/serial_worker.hpp"
 #include "trigpoint/export/session.hpp"
-#include "trigpoint/pipeline/past_beside.hpp"
-#include "trigpoint/pipeline/session_parts.hpp"
 
+#include "offline_session.hpp"
 #include "read_ahead.hpp"
 
 #include <chrono>
-#include <optional>
+#include <memory>
 #include <utility>
 
 namespace trigpoint::pipeline {
@@ -20,211 +19,180 @@ namespace {
 namespace file = exporter::session_file;
 using Clock = std::chrono::steady_clock;
 
-/// Two and a half seconds of IMU samples, with the scans and fixes between them.
-constexpr std::size_t kUnwrittenSteps = 256;
-/// Five seconds at 10 Hz from a snapshot of the past to its correction, however long that takes.
-constexpr std::uint64_t kAdoptAfterScans = 50;
+/// Entries that a run beside others may be behind the reader: two to six sweeps.
+constexpr std::size_t kBehind = 64;
 
 double milliseconds_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-exporter::Opening opening_for(UseOfStored use) {
-  return use == UseOfStored::kResume ? exporter::Opening::kContinue : exporter::Opening::kFresh;
+void tell(const Events& events, const std::function<void(const Event&)>& on_event) {
+  if (on_event) {
+    for (const Event& event : events) {
+      on_event(event);
+    }
+  }
 }
 
-/// Everything that an offline run writes.
-class Session {
+/// The cores on a log, and the session that they leave. For one thread at a time.
+class MapRun {
  public:
-  Session(const std::string& folder, UseOfStored use)
-      : folder_(folder),
-        gps_(folder, opening_for(use)),
-        mapper_(folder,
-                use == UseOfStored::kResume     ? Continuing::kYes
-                : use == UseOfStored::kLocalize ? Continuing::kNoStore
-                                                : Continuing::kNo),
-        gate_(folder, opening_for(use)),
-        log_(folder, opening_for(use)) {}
-
-  /// Before the first step. What is stored may already be there.
-  void correct_past_of(Lockstep& cores, UseOfStored use) {
-    past_.emplace(
-        cores.mapper(),
-        path(file::kKeyframes),
-        use == UseOfStored::kResume ? stored_past(folder_) : lio_mapper::GraphInput{},
-        [this](SerialWorker::Job job) { disk_.give(std::move(job)); },
-        PastBesideOptions{kAdoptAfterScans, 0});
+  /// The session's folder is made and its first files are written.
+  MapRun(const recording::LogReader& log, const CoreConfigs& configs, const MapLogOptions& options)
+      : options_(options),
+        filter_(configs.gps_odometry.filter),
+        log_path_(log.summary().path),
+        cores_(configs),
+        withholding_(options.withhold) {
+    resume();
+    exporter::create_session_folder(options_.session);
+    session_.emplace(options_.session, options_.use);
+    session_->correct_past_of(cores_, options_.use);
+    exporter::write_text(session_->path(file::kConfig), options_.config_text);
+    session_->keep_truth(log);
+    start_ = Clock::now();
+    write_run();  // a run that is killed says at least what it was
   }
 
-  /// Between two steps; `scans` have just been handed to on_step().
-  Events after_scans(std::size_t scans) { return past_->after_scans(scans); }
-
-  void on_entry(const recording::LogEntry& entry) { log_.on_entry(entry); }
-
-  /// Returns at once unless the disk lags far behind; throws when it has refused something.
-  void on_step(Step&& step, const Lockstep& cores, double step_ms) {
-    for (lio_mapper::ScanResult& scan : step.scans) {
-      scan.status.scan_ms += step_ms / static_cast<double>(step.scans.size());
+  void take(recording::LogEntry entry, std::optional<lio_mapper::DecodedCloud> cloud) {
+    if (const auto* fix = std::get_if<GnssFix>(&entry.measurement)) {
+      entry.withheld = withholding_.withholds(fix->stamp_ns) || entry.withheld;
     }
-    keep_datum(cores);
-    const bool judged = !step.fusion_status.empty();
-    if (judged || !step.gps_odometry.empty() || !step.gps_status.empty() || !step.scans.empty() ||
-        !step.fused.empty()) {
-      disk_.give([this, step = std::move(step)] { write(step); });
-    }
-    if (judged) {
-      keep_alignment(cores);
-    }
+    session_->on_entry(entry);
+    advance([&] { return cloud ? cores_.step(entry, std::move(*cloud)) : cores_.step(entry); });
   }
 
-  void close(Lockstep& cores, const recording::LogReader& log) {
-    past_->cancel();
-    keep_datum(cores);
-    keep_alignment(cores);
-    disk_.finish();
-    gps_.keep_counts(cores.gps_status());
-    mapper_.close(cores.lio_status(), cores.checkpoint(), cores.take_rows());
-    gate_.close();
-    log_.close(log);
+  /// The rest; `log` has been read as far as it was.
+  MapLogResult finish(recording::LogReader& log, bool stopped, const std::string& log_error) {
+    advance([&] { return cores_.finish(); });
+    tell(log.take_events(), options_.on_event);
+    tell(recording::undecodable_events(log), options_.on_event);
+    session_->close(cores_, log);
+    result_.stopped = stopped;
+    result_.log_error = log_error;
+    result_.sweeps_in_log = session_->log().sweeps();
+    // The mapper of a resumed session counts on from what it had used before.
+    const bool resumed = options_.stored && options_.use == UseOfStored::kResume;
+    result_.sweeps_used = cores_.lio_status().scans_used -
+                          (resumed ? options_.stored->checkpoint.scans_used : std::uint64_t{0});
+    result_.data_s = to_seconds(session_->log().last_ns() - session_->log().first_ns());
+    result_.wall_s = milliseconds_since(start_) * 1e-3;
+    write_run();
+    return result_;
   }
-
-  void keep_truth(const recording::LogReader& log) const { log_.keep_truth(log); }
-
-  const LogPart& log() const { return log_; }
-
-  std::string path(const char* name) const { return exporter::path_in(folder_, name); }
 
  private:
-  void write(const Step& step) {
-    for (const Odometry& odometry : step.gps_odometry) {
-      gps_.on_odometry(odometry);
+  void resume() {
+    if (!options_.stored || options_.use == UseOfStored::kNothing) {
+      return;
     }
-    for (const GpsStatus& status : step.gps_status) {
-      gps_.on_status(status);
+    lio_mapper::ResumeOptions resume;
+    resume.frozen_map = options_.use == UseOfStored::kLocalize;
+    if (options_.stored->first_pose) {
+      resume.more_places_odom.push_back(*options_.stored->first_pose);
     }
-    for (const lio_mapper::ScanResult& scan : step.scans) {
-      mapper_.on_scan(scan);
-    }
-    for (const Odometry& fused : step.fused) {
-      gate_.on_fused(fused);
-    }
-    for (const FusionStatus& status : step.fusion_status) {
-      gate_.on_status(status);
-    }
+    cores_.resume(options_.stored->checkpoint, options_.stored->points, resume);
   }
 
-  /// As soon as there is one: a run that is killed keeps its georeference.
-  void keep_datum(const Lockstep& cores) {
-    const auto datum = cores.datum();
-    if (datum && datum->id() != written_datum_) {
-      written_datum_ = datum->id();
-      disk_.give([this, datum] { gps_.on_datum(*datum); });
-    }
+  template <typename Advance>
+  void advance(const Advance& step_of_cores) {
+    const Clock::time_point before = Clock::now();
+    Step step = step_of_cores();
+    const double step_ms = milliseconds_since(before);
+    tell(step.events, options_.on_event);
+    const std::size_t scans = step.scans.size();
+    session_->on_step(std::move(step), cores_, step_ms);
+    tell(session_->after_scans(scans), options_.on_event);
   }
 
-  void keep_alignment(const Lockstep& cores) {
-    if (const auto alignment = cores.best_alignment()) {
-      disk_.give([this, alignment, aligned = cores.lio_status().aligned] {
-        gate_.on_alignment(*alignment, aligned);
-      });
-    }
+  void write_run() const {
+    exporter::write_run(session_->path(file::kRun),
+                        {log_path_,
+                         "offline",
+                         options_.mode,
+                         filter_,
+                         result_.data_s,
+                         result_.wall_s,
+                         result_.stopped});
   }
 
-  std::string folder_;
-  std::string written_datum_;
-  GpsPart gps_;
-  MapperPart mapper_;
-  GatePart gate_;
-  LogPart log_;  ///< written by the caller's thread
-  std::optional<PastBeside> past_;
-  SerialWorker disk_{kUnwrittenSteps};  ///< last: its jobs use the others
+  MapLogOptions options_;
+  std::string filter_;
+  std::string log_path_;
+  Lockstep cores_;
+  recording::FixWithholding withholding_;
+  std::optional<OfflineSession> session_;
+  Clock::time_point start_;
+  MapLogResult result_;
 };
 
-void tell(const Events& events, const MapLogOptions& options) {
-  if (options.on_event) {
-    for (const Event& event : events) {
-      options.on_event(event);
-    }
-  }
-}
+/// A run with a thread of its own.
+struct RunBeside {
+  MapRun run;
+  SerialWorker worker{kBehind};  ///< last: its jobs use the run
+
+  RunBeside(const recording::LogReader& log,
+            const CoreConfigs& configs,
+            const MapLogOptions& options)
+      : run(log, configs, options) {}
+};
 
 }  // namespace
 
 MapLogResult map_log(recording::LogReader& log,
                      const CoreConfigs& configs,
                      const MapLogOptions& options) {
-  Lockstep cores(configs);
-  if (options.stored && options.use != UseOfStored::kNothing) {
-    lio_mapper::ResumeOptions resume;
-    resume.frozen_map = options.use == UseOfStored::kLocalize;
-    if (options.stored->first_pose) {
-      resume.more_places_odom.push_back(*options.stored->first_pose);
-    }
-    cores.resume(options.stored->checkpoint, options.stored->points, resume);
-  }
-  exporter::create_session_folder(options.session);
-  Session session(options.session, options.use);
-  session.correct_past_of(cores, options.use);
-  exporter::write_text(session.path(file::kConfig), options.config_text);
-  session.keep_truth(log);
-  const Clock::time_point start = Clock::now();
-  MapLogResult result;
-  const auto write_run = [&] {
-    exporter::write_run(session.path(file::kRun),
-                        {log.summary().path,
-                         "offline",
-                         options.mode,
-                         configs.gps_odometry.filter,
-                         result.data_s,
-                         result.wall_s,
-                         result.stopped});
-  };
-  write_run();  // a run that is killed says at least what it was
-
-  const auto run = [&](auto&& advance) {
-    const Clock::time_point before = Clock::now();
-    Step step = advance();
-    const double step_ms = milliseconds_since(before);
-    tell(step.events, options);
-    const std::size_t scans = step.scans.size();
-    session.on_step(std::move(step), cores, step_ms);
-    tell(session.after_scans(scans), options);
-  };
-  tell(recording::fault_events(log.summary()), options);
+  MapRun run(log, configs, options);
+  tell(recording::fault_events(log.summary()), options.on_event);
+  bool stopped = false;
   ReadAhead ahead(log, configs.lio_mapper);
   while (auto item = ahead.next()) {
-    tell(item->events, options);
-    session.on_entry(item->entry);
-    run([&] {
-      return item->decoded ? cores.step(item->entry, std::move(*item->decoded))
-                           : cores.step(item->entry);
-    });
+    tell(item->events, options.on_event);
+    run.take(std::move(item->entry), std::move(item->decoded));
     if (options.progress) {
       options.progress(item->progress);
     }
     if (options.stop && options.stop()) {
-      result.stopped = true;
+      stopped = true;
       break;
     }
   }
   ahead.stop();
-  if (!result.stopped) {
-    result.log_error = ahead.error();  // else perhaps of what this run never reached
-  }
-  run([&] { return cores.finish(); });
-  tell(log.take_events(), options);
-  tell(recording::undecodable_events(log), options);
-  session.close(cores, log);
+  // When stopped, perhaps of what this run never reached.
+  return run.finish(log, stopped, stopped ? "" : ahead.error());
+}
 
-  result.sweeps_in_log = session.log().sweeps();
-  // The mapper of a resumed session counts on from what it had used before.
-  const bool resumed = options.stored && options.use == UseOfStored::kResume;
-  result.sweeps_used = cores.lio_status().scans_used -
-                       (resumed ? options.stored->checkpoint.scans_used : std::uint64_t{0});
-  result.data_s = to_seconds(session.log().last_ns() - session.log().first_ns());
-  result.wall_s = milliseconds_since(start) * 1e-3;
-  write_run();
-  return result;
+std::vector<MapLogResult> map_log_side_by_side(recording::LogReader& log,
+                                               const std::vector<RunOfMany>& runs,
+                                               const SideBySideOptions& options) {
+  std::vector<std::unique_ptr<RunBeside>> beside;
+  for (const RunOfMany& run : runs) {
+    beside.push_back(std::make_unique<RunBeside>(log, run.configs, run.options));
+  }
+  tell(recording::fault_events(log.summary()), options.on_event);
+  bool stopped = false;
+  ReadAhead ahead(log, runs.at(0).configs.lio_mapper);
+  while (auto next = ahead.next()) {
+    tell(next->events, options.on_event);
+    const auto item = std::make_shared<const ReadAhead::Item>(std::move(*next));
+    for (const auto& each : beside) {
+      each->worker.give([&run = each->run, item] { run.take(item->entry, item->decoded); });
+    }
+    if (options.progress) {
+      options.progress(item->progress);
+    }
+    if (options.stop && options.stop()) {
+      stopped = true;
+      break;
+    }
+  }
+  ahead.stop();
+  std::vector<MapLogResult> results;
+  for (const auto& each : beside) {
+    each->worker.finish();
+    results.push_back(each->run.finish(log, stopped, stopped ? "" : ahead.error()));
+  }
+  return results;
 }
 
 }  // namespace trigpoint::pipeline

@@ -14,6 +14,9 @@ class DecodedCloud {
  public:
   struct Content;
   explicit DecodedCloud(std::unique_ptr<Content> content);
+  /// For another mapper that takes the same cloud.
+  DecodedCloud(const DecodedCloud& other);
+  DecodedCloud& operator=(const DecodedCloud& other);
   DecodedCloud(DecodedCloud&&) noexcept;
   DecodedCloud& operator=(DecodedCloud&&) noexcept;
   ~DecodedCloud();

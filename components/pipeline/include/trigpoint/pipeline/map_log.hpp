@@ -4,11 +4,13 @@
 
 #include "trigpoint/pipeline/lockstep.hpp"
 #include "trigpoint/pipeline/session_parts.hpp"
+#include "trigpoint/recording/fix_withholding.hpp"
 #include "trigpoint/recording/log.hpp"
 
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace trigpoint::pipeline {
 
@@ -30,6 +32,8 @@ struct MapLogOptions {
   std::function<bool()> stop;
   UseOfStored use{UseOfStored::kNothing};
   std::optional<StoredSession> stored;  ///< what `use` is about
+  /// Fixes that no core is given, beside those that the log marks; the session holds them.
+  recording::FixWithholding withhold{};
 };
 
 struct MapLogResult {
@@ -47,5 +51,26 @@ struct MapLogResult {
 MapLogResult map_log(recording::LogReader& log,
                      const CoreConfigs& configs,
                      const MapLogOptions& options);
+
+/// One of several runs over the same log. `options.progress` and `options.stop` are those of all,
+/// in SideBySideOptions; `options.on_event` is called on a thread of the run's own.
+struct RunOfMany {
+  CoreConfigs configs;
+  MapLogOptions options;
+};
+
+struct SideBySideOptions {
+  std::function<void(double)> progress;
+  std::function<void(const Event&)> on_event;  ///< of the log
+  std::function<bool()> stop;
+};
+
+/// map_log of each run, in the order given, while the log is read (or made) once only. Every run
+/// has a thread of its own and leaves the bytes that it leaves alone. The clouds are decoded with
+/// the first run's configuration: lio_mapper.sweep must be the same in all. Throws as map_log does;
+/// what the other runs have written stays.
+std::vector<MapLogResult> map_log_side_by_side(recording::LogReader& log,
+                                               const std::vector<RunOfMany>& runs,
+                                               const SideBySideOptions& options);
 
 }  // namespace trigpoint::pipeline
