@@ -104,6 +104,11 @@ void describe_matching(MatchingConfig& c, ConfigFields& f) {
       "the residuals of a scan in a cube of this side together weigh as one, because they share "
       "the map's errors",
       {0.01, 1000.0});
+  f.integer("max_patches",
+            c.max_patches,
+            "more such cubes weigh as this many together: sweep, map and calibration have errors "
+            "that all share",
+            {1, 1e6});
   f.integer(
       "min_matches", c.min_matches, "fewer matched points and the scan is not used", {6, 1e6});
   f.integer("max_iterations", c.max_iterations, "of the iterated update", {1, 50});

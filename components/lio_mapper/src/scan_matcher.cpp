@@ -329,7 +329,9 @@ Information<Size> ScanMatcher::sum_of_all(const Viewpoint& view,
   const Eigen::LLT<Matrix> root(sum.information + kLeastInformation * Matrix::Identity());
   const typename Information<Size>::Vector step = -root.solve(sum.gradient);
   allow_for_scatter(scatter_after(step, scratch), root, step, sum);
-  const double scale = static_cast<double>(count_patches()) / static_cast<double>(sum.count);
+  const auto most = static_cast<std::size_t>(config_.max_patches);
+  const double scale =
+      static_cast<double>(std::min(count_patches(), most)) / static_cast<double>(sum.count);
   sum.information = (scale * by * sum.information * by).eval();
   sum.gradient = (scale * by * sum.gradient).eval();
   sum.noise *= scale;

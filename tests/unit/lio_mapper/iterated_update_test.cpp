@@ -224,6 +224,7 @@ TEST(ScanMatcher, gradient_and_information_are_the_derivatives_of_the_cost) {
   const RoomMap map;
   MatchingConfig config;
   config.patch_m = 0.01;
+  config.max_patches = 1'000'000;
   config.robust_width = 1e9;
   config.range_sigma_m = 0.02;
   config.angle_sigma_rad = 0.0;
@@ -277,6 +278,7 @@ TEST(ScanMatcher, gradient_with_extrinsic_is_the_derivative_of_the_cost) {
   const RoomMap map;
   MatchingConfig config;
   config.patch_m = 0.01;
+  config.max_patches = 1'000'000;
   config.grazing_cos = 0.0;
   config.robust_width = 1e9;
   config.range_sigma_m = 0.0;
@@ -355,6 +357,20 @@ TEST(ScanMatcher, residuals_of_one_patch_weigh_as_one) {
   };
   EXPECT_NEAR(information_of(900, 0) / information_of(1, 0), 1.0, 1e-9);
   EXPECT_NEAR(information_of(900, 900) / information_of(900, 0), 2.0, 0.05);
+}
+
+TEST(ScanMatcher, more_patches_than_the_most_weigh_as_the_most) {
+  const RoomMap map;
+  const auto information_of = [&](std::int64_t max_patches) {
+    MatchingConfig config;
+    config.max_patches = max_patches;
+    const auto side = static_cast<float>(config.patch_m);
+    const PointCloud points{{10.0F, 1.0F, 0.0F, 0.0F}, {10.0F, 1.0F - side, 0.0F, 0.0F}};
+    ScanMatcher matcher(points, map, Pose{}, config, workers);
+    return matcher.linearise({}).information(0, 0);
+  };
+  EXPECT_NEAR(information_of(2) / information_of(1), 2.0, 1e-9);
+  EXPECT_DOUBLE_EQ(information_of(200), information_of(2));
 }
 
 TEST(ScanMatcher, sums_to_the_same_bits_on_any_number_of_threads) {
