@@ -6,6 +6,7 @@
 
 #include <unistd.h>
 
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -18,6 +19,8 @@ constexpr const char* kAge = "running_s";
 constexpr const char* kProcess = "process";
 /// Ages that differ by less say nothing about who was first.
 constexpr double kSameAge_s = 0.5;
+/// So long one that is too many stays, for the first one to hear of it.
+constexpr std::chrono::milliseconds kLastWord{300};
 
 }  // namespace
 
@@ -92,7 +95,8 @@ void OnlyOne::hear(const Claim& other) {
     log_.error(who +
                " was first on this DDS domain and what both publish would be mixed: ending. " +
                "End the other one, or take another domain (ROS_DOMAIN_ID=N)");
-    loop_.stop();
+    claim();
+    loop_.every(kLastWord, [this] { loop_.stop(); });
   } else if (known_.insert(other.participant).second) {
     log_.warning(who +
                  " has come to this DDS domain, where there may be one: it should end itself");
