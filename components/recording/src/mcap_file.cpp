@@ -286,18 +286,7 @@ class McapFile : public BagFile {
       }
       return head.has_value();
     }
-    if (op == Op::kChannel) {
-      auto channel = mcap::parse_channel(record);
-      return channel && (layout_.channels.emplace(channel->id, std::move(*channel)), true);
-    }
-    if (op == Op::kSchema) {
-      auto schema = mcap::parse_schema(record);
-      if (schema) {
-        schema->data.clear();
-      }
-      return schema && (layout_.schemas.emplace(schema->id, std::move(*schema)), true);
-    }
-    return static_cast<std::uint8_t>(op) != 0;
+    return static_cast<std::uint8_t>(op) != 0 && mcap::take_definition(op, record, layout_);
   }
 
   void open_block(std::size_t number) {

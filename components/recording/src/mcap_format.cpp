@@ -203,6 +203,14 @@ void RecordWriter::texts(const std::map<std::string, std::string>& values) {
   }
 }
 
+void RecordWriter::numbers(const std::map<std::uint16_t, std::uint64_t>& values) {
+  number(values.size() * 10, 4);
+  for (const auto& [key, value] : values) {
+    number(key, 2);
+    number(value, 8);
+  }
+}
+
 void RecordWriter::bytes(Bytes bytes) {
   content_.insert(content_.end(), bytes.begin(), bytes.end());
 }
@@ -282,11 +290,7 @@ void RecordWriter::chunk_index(const ChunkIndex& index) {
     number(bytes_of(index.last_ns), 8);
     number(index.chunk_begin, 8);
     number(index.chunk_length, 8);
-    number(index.message_index_begins.size() * 10, 4);
-    for (const auto& [channel_id, begin] : index.message_index_begins) {
-      number(channel_id, 2);
-      number(begin, 8);
-    }
+    numbers(index.message_index_begins);
     number(index.message_index_length, 8);
     text(index.compression);
     number(index.stored, 8);
@@ -304,11 +308,7 @@ void RecordWriter::statistics(const Statistics& statistics) {
     number(statistics.chunks, 4);
     number(bytes_of(statistics.first_ns), 8);
     number(bytes_of(statistics.last_ns), 8);
-    number(statistics.channel_messages.size() * 10, 4);
-    for (const auto& [channel_id, count] : statistics.channel_messages) {
-      number(channel_id, 2);
-      number(count, 8);
-    }
+    numbers(statistics.channel_messages);
   });
 }
 

@@ -199,6 +199,7 @@ class RecordWriter {
   void number(std::uint64_t value, std::size_t bytes);
   void text(const std::string& text);
   void texts(const std::map<std::string, std::string>& values);
+  void numbers(const std::map<std::uint16_t, std::uint64_t>& values);
 
   std::vector<std::uint8_t> content_;
 };

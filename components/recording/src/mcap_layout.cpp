@@ -131,27 +131,8 @@ class Scanner {
         return index.has_value();
       }
       default:
-        return take_definition(op, record);
+        return take_definition(op, record, layout_);
     }
-  }
-
-  bool take_definition(Op op, Bytes record) {
-    if (op == Op::kSchema) {
-      auto schema = parse_schema(record);
-      if (schema) {
-        schema->data.clear();
-        layout_.schemas.emplace(schema->id, std::move(*schema));
-      }
-      return schema.has_value();
-    }
-    if (op == Op::kChannel) {
-      auto channel = parse_channel(record);
-      if (channel) {
-        layout_.channels.emplace(channel->id, std::move(*channel));
-      }
-      return channel.has_value();
-    }
-    return true;
   }
 
   void walk(std::uint64_t begin) {
@@ -195,7 +176,8 @@ class Scanner {
       case Op::kSchema:
       case Op::kChannel: {
         const auto record = record_at(begin, *head);
-        return record && take_definition(head->op, *record) ? std::optional(end) : std::nullopt;
+        return record && take_definition(head->op, *record, layout_) ? std::optional(end)
+                                                                     : std::nullopt;
       }
       case Op::kMessageIndex:
       case Op::kAttachment:
@@ -306,6 +288,25 @@ class Scanner {
 };
 
 }  // namespace
+
+bool take_definition(Op op, Bytes record, Layout& layout) {
+  if (op == Op::kSchema) {
+    auto schema = parse_schema(record);
+    if (schema) {
+      schema->data.clear();
+      layout.schemas.emplace(schema->id, std::move(*schema));
+    }
+    return schema.has_value();
+  }
+  if (op == Op::kChannel) {
+    auto channel = parse_channel(record);
+    if (channel) {
+      layout.channels.emplace(channel->id, std::move(*channel));
+    }
+    return channel.has_value();
+  }
+  return true;
+}
 
 Layout scan(InputFile& file) {
   return Scanner(file).scan();

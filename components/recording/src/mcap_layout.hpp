@@ -43,4 +43,8 @@ struct Layout {
 /// version 0, or is cut off in its header.
 Layout scan(InputFile& file);
 
+/// Notes a Schema (without its text) or a Channel; passes over every other record. False when it is
+/// damaged.
+bool take_definition(Op op, Bytes record, Layout& layout);
+
 }  // namespace trigpoint::recording::mcap
