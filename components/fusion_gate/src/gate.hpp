@@ -63,7 +63,7 @@ struct FusionGate::Impl {
   bool is_mapper_awaited(Output& out);
   void note_refused(const ToldFix& told, const PoseBuffer::Answer& lio_pose);
   void take_yaw(const YawMeasurement& yaw, Output& out);
-  void tell_of_heading(Output& out);
+  void tell_of_heading(const std::optional<YawPrior>& prior, Output& out);
   void judge(const AcceptedFix& fix, const PoseBuffer::Answer& lio_pose, Output& out);
   void add_pair(const AcceptedFix& fix, const PoseBuffer::Sample& at_fix, Output& out);
   void make_rows(const AcceptedFix& fix, Output& out);

@@ -96,9 +96,8 @@ void FusionGate::Impl::take_yaw(const YawMeasurement& yaw, Output& out) {
 }
 
 /// That a heading is not used is said once an alignment.
-void FusionGate::Impl::tell_of_heading(Output& out) {
+void FusionGate::Impl::tell_of_heading(const std::optional<YawPrior>& prior, Output& out) {
   constexpr const char* kCode = "heading_contradicted";
-  const std::optional<YawPrior> prior = heading.prior();
   if (prior && window.solution() && window.solution()->contradicts_heading &&
       headings_told.insert(kCode).second) {
     tell(out,
@@ -119,14 +118,15 @@ void FusionGate::Impl::add_pair(const AcceptedFix& fix,
   const Eigen::Vector3d variance_m2 = floored(fix.covariance_map_m2, config.min_sigma_m).diagonal();
   const Witness witness = witness_of(fix, at_fix);
   heading.match(lio_poses);
-  window.set_heading(heading.prior());
+  const std::optional<YawPrior> prior = heading.prior();
+  window.set_heading(prior);
   const bool added = window.add({fix.stamp_ns,
                                  fix.antenna_map_m,
                                  variance_m2,
                                  antenna_odom_m,
                                  at_fix.distance_m,
                                  least_share_of(witness).mean()});
-  tell_of_heading(out);
+  tell_of_heading(prior, out);
   if (!window.admitted()) {
     const std::string why = window.obstacle().value_or("no solution");
     verdicts.record(fix.stamp_ns,
