@@ -126,6 +126,39 @@ class MapRun {
   MapLogResult result_;
 };
 
+struct Reading {
+  bool stopped{false};
+  /// Why the log broke off. None when stopped: it may have been beyond what the runs were given.
+  std::string error;
+};
+
+/// Hands over the log's entries one by one, their clouds decoded. `options` are those of one run or
+/// of several.
+template <typename Options, typename Take>
+Reading read_all(recording::LogReader& log,
+                 const lio_mapper::Config& config,
+                 const Options& options,
+                 const Take& take) {
+  tell(recording::fault_events(log.summary()), options.on_event);
+  Reading reading;
+  ReadAhead ahead(log, config);
+  while (auto item = ahead.next()) {
+    tell(item->events, options.on_event);
+    const double progress = item->progress;
+    take(std::move(*item));
+    if (options.progress) {
+      options.progress(progress);
+    }
+    if (options.stop && options.stop()) {
+      reading.stopped = true;
+      break;
+    }
+  }
+  ahead.stop();
+  reading.error = reading.stopped ? "" : ahead.error();
+  return reading;
+}
+
 /// A run with a thread of its own.
 struct RunBeside {
   MapRun run;
@@ -143,23 +176,10 @@ MapLogResult map_log(recording::LogReader& log,
                      const CoreConfigs& configs,
                      const MapLogOptions& options) {
   MapRun run(log, configs, options);
-  tell(recording::fault_events(log.summary()), options.on_event);
-  bool stopped = false;
-  ReadAhead ahead(log, configs.lio_mapper);
-  while (auto item = ahead.next()) {
-    tell(item->events, options.on_event);
-    run.take(std::move(item->entry), std::move(item->decoded));
-    if (options.progress) {
-      options.progress(item->progress);
-    }
-    if (options.stop && options.stop()) {
-      stopped = true;
-      break;
-    }
-  }
-  ahead.stop();
-  // When stopped, perhaps of what this run never reached.
-  return run.finish(log, stopped, stopped ? "" : ahead.error());
+  const Reading reading = read_all(log, configs.lio_mapper, options, [&](ReadAhead::Item&& item) {
+    run.take(std::move(item.entry), std::move(item.decoded));
+  });
+  return run.finish(log, reading.stopped, reading.error);
 }
 
 std::vector<MapLogResult> map_log_side_by_side(recording::LogReader& log,
@@ -169,28 +189,17 @@ std::vector<MapLogResult> map_log_side_by_side(recording::LogReader& log,
   for (const RunOfMany& run : runs) {
     beside.push_back(std::make_unique<RunBeside>(log, run.configs, run.options));
   }
-  tell(recording::fault_events(log.summary()), options.on_event);
-  bool stopped = false;
-  ReadAhead ahead(log, runs.at(0).configs.lio_mapper);
-  while (auto next = ahead.next()) {
-    tell(next->events, options.on_event);
-    const auto item = std::make_shared<const ReadAhead::Item>(std::move(*next));
-    for (const auto& each : beside) {
-      each->worker.give([&run = each->run, item] { run.take(item->entry, item->decoded); });
-    }
-    if (options.progress) {
-      options.progress(item->progress);
-    }
-    if (options.stop && options.stop()) {
-      stopped = true;
-      break;
-    }
-  }
-  ahead.stop();
+  const Reading reading =
+      read_all(log, runs.at(0).configs.lio_mapper, options, [&](ReadAhead::Item&& read) {
+        const auto item = std::make_shared<const ReadAhead::Item>(std::move(read));
+        for (const auto& each : beside) {
+          each->worker.give([&run = each->run, item] { run.take(item->entry, item->decoded); });
+        }
+      });
   std::vector<MapLogResult> results;
   for (const auto& each : beside) {
     each->worker.finish();
-    results.push_back(each->run.finish(log, stopped, stopped ? "" : ahead.error()));
+    results.push_back(each->run.finish(log, reading.stopped, reading.error));
   }
   return results;
 }
