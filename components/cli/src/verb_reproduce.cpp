@@ -91,7 +91,7 @@ bool run_drive(const DriveToRun& drive,
 }
 
 std::string how(const ReproduceOptions& options, const DriveToRun& any) {
-  const SystemConfig config = open_input(any.input).config;
+  const SystemConfig config = load_config_of(any.input);
   std::string text = "Made by `trigpoint reproduce` (" TRIGPOINT_VERSION "); GPS filter `" +
                      config.cores.gps_odometry.filter + "`.";
   if (const double duration_s = any.input.duration_s; duration_s > 0.0) {
