@@ -2,12 +2,11 @@
 // Copyright the Trigpoint developers
 #include "trigpoint/base/heading.hpp"
 
+#include "trigpoint/base/sentence.hpp"
 #include "trigpoint/base/so3.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 
 namespace trigpoint {
 
@@ -16,12 +15,6 @@ namespace {
 constexpr double kHugeVariance_rad2 = 1e6;
 constexpr double kUnitTolerance = 0.05;
 constexpr double kLeastNorm = 1e-6;  // drivers without attitude send zeros
-
-std::string sentence(const char* format, double value) {
-  std::array<char, 160> text{};
-  std::snprintf(text.data(), text.size(), format, value);
-  return text.data();
-}
 
 }  // namespace
 

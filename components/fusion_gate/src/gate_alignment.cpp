@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
+#include "trigpoint/base/sentence.hpp"
+
 #include "gate.hpp"
-#include "sentence.hpp"
 
 #include <algorithm>
 #include <numbers>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
 #include "trigpoint/base/rejections.hpp"
+#include "trigpoint/base/sentence.hpp"
 
 #include "gate.hpp"
-#include "sentence.hpp"
 
 #include <algorithm>
 #include <map>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
+#include "trigpoint/base/sentence.hpp"
 #include "trigpoint/base/so3.hpp"
 
 #include "fusion/fused_odometry.hpp"
 #include "gate.hpp"
-#include "sentence.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -2,8 +2,9 @@
 // Copyright the Trigpoint developers
 // Mode smooth: Algorithm I with hysteresis, joined by tests of the values against LIO, and what
 // becomes of T_map_odom when they find out a liar.
+#include "trigpoint/base/sentence.hpp"
+
 #include "gate.hpp"
-#include "sentence.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -2,12 +2,12 @@
 // Copyright the Trigpoint developers
 #include "trigpoint/geodesy/local_frame.hpp"
 
+#include "trigpoint/base/sentence.hpp"
+
 #include "utm_plane.hpp"
 #include <GeographicLib/LocalCartesian.hpp>
 
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <stdexcept>
 #include <vector>
 
@@ -17,12 +17,6 @@ namespace {
 
 // Beyond this no vehicle that maps the ground can be.
 constexpr double kHighestHeight_m = 20'000.0;
-
-std::string sentence(const char* format, double value) {
-  std::array<char, 160> text{};
-  std::snprintf(text.data(), text.size(), format, value);
-  return text.data();
-}
 
 }  // namespace
 

@@ -2,15 +2,14 @@
 // Copyright the Trigpoint developers
 #include "aiding.hpp"
 
+#include "trigpoint/base/sentence.hpp"
 #include "trigpoint/base/so3.hpp"
 
 #include "fix_checks.hpp"
 #include <Eigen/Cholesky>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 
 namespace trigpoint::gps_odometry {
 
@@ -24,12 +23,6 @@ constexpr double kNothing_m2ps2 = 1e8;
 constexpr double kHugeVariance = 1e6;
 constexpr int kRefusedInARow = 20;
 constexpr Nanoseconds kDistrust_ns = 20 * kNanosecondsPerSecond;
-
-std::string sentence(const char* format, double value) {
-  std::array<char, 160> text{};
-  std::snprintf(text.data(), text.size(), format, value);
-  return text.data();
-}
 
 /// A covariance with something in every axis: unknown axes are wide, but forward the default.
 Matrix3d usable_covariance(const TwistMeasurement& twist, const Config& config) {

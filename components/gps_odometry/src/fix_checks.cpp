@@ -2,11 +2,11 @@
 // Copyright the Trigpoint developers
 #include "fix_checks.hpp"
 
+#include "trigpoint/base/sentence.hpp"
+
 #include <Eigen/Eigenvalues>
 
-#include <array>
 #include <cmath>
-#include <cstdio>
 
 namespace trigpoint::gps_odometry {
 
@@ -22,12 +22,6 @@ constexpr double kLeastSigma_m = 0.005;
 constexpr double kVerticalFactor = 2.0;
 // Receivers with nothing to say send places within 0.1 m of 0, 0.
 constexpr double kNullIsland_deg = 1e-6;
-
-std::string sentence(const char* format, double value) {
-  std::array<char, 160> text{};
-  std::snprintf(text.data(), text.size(), format, value);
-  return text.data();
-}
 
 FixVerdict refuse(const std::string& reason, const std::string& text) {
   return {std::nullopt, reason, text};

@@ -2,11 +2,11 @@
 // Copyright the Trigpoint developers
 #include "start_up.hpp"
 
+#include "trigpoint/base/sentence.hpp"
 #include "trigpoint/base/so3.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 namespace trigpoint::lio_mapper {
 
@@ -28,12 +28,6 @@ constexpr double kTrialSigmaFactor = 2.0;
 constexpr double kVelocityMoving_mps = 0.5;
 constexpr int kRefinements = 2;
 constexpr int kTrials = 3;
-
-std::string sentence(const char* format, double a, double b = 0.0, double c = 0.0) {
-  char text[400];
-  std::snprintf(text, sizeof text, format, a, b, c);
-  return text;
-}
 
 Eigen::Quaterniond without_yaw(const Eigen::Quaterniond& q) {
   return (from_yaw(-yaw_of(q)) * q).normalized();

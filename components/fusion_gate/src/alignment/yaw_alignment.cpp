@@ -6,10 +6,10 @@
 // Wilson, M. M. Hilferty, "The distribution of chi-square", PNAS 17 (1931).
 #include "alignment/yaw_alignment.hpp"
 
+#include "trigpoint/base/sentence.hpp"
 #include "trigpoint/base/so3.hpp"
 
 #include "alignment/median.hpp"
-#include "sentence.hpp"
 #include <Eigen/Cholesky>
 
 #include <algorithm>

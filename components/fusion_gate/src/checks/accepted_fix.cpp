@@ -2,7 +2,7 @@
 // Copyright the Trigpoint developers
 #include "checks/accepted_fix.hpp"
 
-#include "sentence.hpp"
+#include "trigpoint/base/sentence.hpp"
 
 namespace trigpoint::fusion_gate {
 

@@ -2,7 +2,7 @@
 // Copyright the Trigpoint developers
 #include "control/algorithm_one.hpp"
 
-#include "sentence.hpp"
+#include "trigpoint/base/sentence.hpp"
 
 #include <algorithm>
 #include <cassert>

@@ -2,9 +2,10 @@
 // Copyright the Trigpoint developers
 #include "control/fix_monitor.hpp"
 
+#include "trigpoint/base/sentence.hpp"
+
 #include "fusion/fused_odometry.hpp"
 #include "fusion/rows.hpp"
-#include "sentence.hpp"
 
 #include <algorithm>
 #include <numeric>

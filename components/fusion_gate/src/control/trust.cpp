@@ -2,8 +2,9 @@
 // Copyright the Trigpoint developers
 #include "control/trust.hpp"
 
+#include "trigpoint/base/sentence.hpp"
+
 #include "checks/displacement.hpp"
-#include "sentence.hpp"
 
 #include <algorithm>
 
