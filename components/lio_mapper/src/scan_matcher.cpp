@@ -25,6 +25,9 @@ constexpr double kLeastRange_m = 1e-3;
 constexpr double kOpenPosition_m = 0.01;
 constexpr double kOpenRotation_rad = 2e-3;
 constexpr double kLeastInformation = 1e-3;  // of directions that no residual sees
+/// Of the stated variance of residuals that are known to scatter less: what a scan shares with the
+/// map scatters in neither.
+constexpr double kLeastScatter = 0.1;
 /// FAST-LIO2's acceptance 1 - 0.9 |r| / sqrt(range) > 0.9: near points must fit more closely.
 constexpr double kGatePerRootRange = 1.0 / 9.0;
 /// Planes of few points look thinner than they are.
@@ -80,22 +83,22 @@ typename Information<Size>::Matrix noise_free_share(const Information<Size>& sum
 /// their estimate is as much less certain: with A = L L^T and B = sum w^2 r^2 h h^T its covariance
 /// is A^-1 B A^-1 [H. White, "A heteroskedasticity-consistent covariance matrix estimator", 1980],
 /// and the eigenvalues of L^-1 B L^-T are how many times the stated variance that is, direction by
-/// direction. Each such direction keeps its estimate and loses that share of its information;
-/// where they scatter less, nothing is gained: what a scan shares with the map scatters in neither.
+/// direction. Each such direction keeps its estimate and loses that share of its information, or
+/// gains it where they scatter less, down to `least` of the stated variance.
 template <int Size>
 void allow_for_scatter(const typename Information<Size>::Matrix& scatter,
                        const Eigen::LLT<typename Information<Size>::Matrix>& root,
                        const typename Information<Size>::Vector& step,
+                       double least,
                        Information<Size>& sum) {
   using Matrix = typename Information<Size>::Matrix;
-  const Matrix half = root.matrixL().solve(scatter);
+  // What no residual sees scatters as the root says, neither more nor less.
+  const Matrix half =
+      root.matrixL().solve((scatter + kLeastInformation * Matrix::Identity()).eval());
   const Matrix times_stated = root.matrixL().solve(half.transpose());
   const Eigen::SelfAdjointEigenSolver<Matrix> eigen(times_stated);
-  if (!(eigen.eigenvalues()[Size - 1] > 1.0)) {
-    return;
-  }
   const Matrix directions = root.matrixL() * eigen.eigenvectors();
-  sum.information = directions * eigen.eigenvalues().cwiseMax(1.0).cwiseInverse().asDiagonal() *
+  sum.information = directions * eigen.eigenvalues().cwiseMax(least).cwiseInverse().asDiagonal() *
                     directions.transpose();
   sum.gradient = -(sum.information * step).eval();
 }
@@ -321,6 +324,14 @@ Information<Size> ScanMatcher::sum_of_all(const Viewpoint& view,
     sum.weighted_thickness2 += part.weighted_thickness2;
     sum.count += part.count;
   }
+  return sum;
+}
+
+/// What the sum over all residuals is worth.
+template <int Size>
+Information<Size> ScanMatcher::weighed(Information<Size> sum,
+                                       double least_scatter,
+                                       Scratch<Size>& scratch) {
   if (sum.count == 0) {
     return sum;
   }
@@ -328,7 +339,7 @@ Information<Size> ScanMatcher::sum_of_all(const Viewpoint& view,
   const Matrix by = noise_free_share(sum);
   const Eigen::LLT<Matrix> root(sum.information + kLeastInformation * Matrix::Identity());
   const typename Information<Size>::Vector step = -root.solve(sum.gradient);
-  allow_for_scatter(scatter_after(step, scratch), root, step, sum);
+  allow_for_scatter(scatter_after(step, scratch), root, step, least_scatter, sum);
   const auto most = static_cast<std::size_t>(config_.max_patches);
   const double scale =
       static_cast<double>(std::min(count_patches(), most)) / static_cast<double>(sum.count);
@@ -344,12 +355,15 @@ Information<Size> ScanMatcher::linearise_all(const Viewpoint& view,
                                              Scratch<Size>& scratch) {
   Information<Size> sum = sum_of_all(view, origins, scratch);
   if (!std::exchange(judged_, true)) {
-    also_nearest_ = leaves_pose_open(sum.information.template topLeftCorner<6, 6>());
+    const auto cautious = weighed(sum, 1.0, scratch);
+    also_nearest_ = leaves_pose_open(cautious.information.template topLeftCorner<6, 6>());
     if (also_nearest_) {
       sum = sum_of_all(view, origins, scratch);
     }
   }
-  return sum;
+  // A plane of the few points nearest to one that is matched goes through them whatever their
+  // noise: that residuals against such planes are small is no witness.
+  return weighed(sum, also_nearest_ ? 1.0 : kLeastScatter, scratch);
 }
 
 PoseInformation ScanMatcher::linearise(const Pose& T_odom_base) {

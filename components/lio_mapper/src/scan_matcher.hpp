@@ -96,6 +96,8 @@ class ScanMatcher {
                                const MapOrigins* origins,
                                Scratch<Size>& scratch);
   template <int Size>
+  Information<Size> weighed(Information<Size> sum, double least_scatter, Scratch<Size>& scratch);
+  template <int Size>
   Information<Size> linearise_all(const Viewpoint& view,
                                   const MapOrigins* origins,
                                   Scratch<Size>& scratch);

@@ -141,6 +141,9 @@ TEST(ScanMatcher, a_residual_that_is_not_looked_up_again_is_of_the_present_pose)
   EXPECT_NEAR(step.tail<5>().norm(), 0.0, 1e-6);
 }
 
+/// So many patches that surfaces hold the pose.
+constexpr double kFinePatch_m = 0.5;
+
 /// The room's walls of x, whose points lie off them by `rough_m`, one to either side in turn.
 PoseInformation information_of_rough_ends(float rough_m, const Pose& T) {
   Matching m(true);
@@ -150,15 +153,20 @@ PoseInformation information_of_rough_ends(float rough_m, const Pose& T) {
     p.x += end ? (++i % 2 == 0 ? rough_m : -rough_m) : 0.0F;
   }
   m.config.robust_width = 1e9;
+  m.config.patch_m = kFinePatch_m;
+  m.config.max_patches = kPoints;
   ScanMatcher matcher(m.points, m.room, Pose{}, m.config, m.workers);
   return matcher.linearise(T);
 }
 
+/// Residuals of surfaces that do not scatter at all gain as much as may be gained.
+constexpr double kMostGained = 10.0;
+
 /// Their estimate's variance is that of the mean of such points, whatever the sensor's.
-TEST(ScanMatcher, residuals_that_scatter_more_than_they_say_leave_the_pose_as_much_less_certain) {
-  constexpr float kRough_m = 0.12F;
+TEST(ScanMatcher, surfaces_leave_the_pose_as_uncertain_as_residuals_scatter) {
+  constexpr float kRough_m = 0.06F;  // more would leave the pose open
   const Pose T;
-  const double smooth = information_of_rough_ends(0.0F, T).information(0, 0);
+  const double stated = information_of_rough_ends(0.0F, T).information(0, 0) / kMostGained;
   const double rough = information_of_rough_ends(kRough_m, T).information(0, 0);
   // Var(sum w r / sum w) over its stated value 1 / sum w.
   const MatchingConfig config;
@@ -177,13 +185,29 @@ TEST(ScanMatcher, residuals_that_scatter_more_than_they_say_leave_the_pose_as_mu
     }
   }
   const double times_stated = kRough_m * kRough_m * weights2 / weights;
-  ASSERT_GT(times_stated, 10.0);
-  EXPECT_NEAR(smooth / rough, times_stated, 0.05 * times_stated);
+  ASSERT_GT(times_stated, 5.0);
+  EXPECT_NEAR(stated / rough, times_stated, 0.05 * times_stated);
+  constexpr float kFlat_m = 0.02F;
+  const double flat = information_of_rough_ends(kFlat_m, T).information(0, 0);
+  EXPECT_GT(flat, 1.2 * stated);
+  EXPECT_NEAR(flat / rough, std::pow(kRough_m / kFlat_m, 2), 0.5);
   // The other axes keep what they had.
   EXPECT_NEAR(information_of_rough_ends(kRough_m, T).information(1, 1) /
                   information_of_rough_ends(0.0F, T).information(1, 1),
               1.0,
               0.02);
+}
+
+/// Planes of the nearest points go through them: that nothing scatters there tells nothing.
+TEST(ScanMatcher, residuals_gain_nothing_where_nearest_points_are_matched) {
+  const auto information = [](bool ends) {
+    Matching m(ends);
+    m.config.patch_m = kFinePatch_m;  // the most, with or without ends
+    ScanMatcher matcher(m.points, m.room, Pose{}, m.config, m.workers);
+    const PoseInformation sum = matcher.linearise(Pose{});
+    return sum.information(1, 1) * static_cast<double>(sum.count);
+  };
+  EXPECT_NEAR(information(true) / information(false), kMostGained, 1e-3 * kMostGained);
 }
 
 /// A wrong prediction is no scatter, or it would hold itself up.
