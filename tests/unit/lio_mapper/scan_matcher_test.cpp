@@ -5,11 +5,13 @@
 
 #include "trigpoint/base/so3.hpp"
 
+#include "voxel_key.hpp"
 #include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
 #include <atomic>
 #include <cmath>
+#include <random>
 #include <utility>
 
 namespace trigpoint::lio_mapper {
@@ -217,6 +219,80 @@ TEST(ScanMatcher, residuals_of_a_wrong_prediction_lose_nothing) {
   EXPECT_NEAR(
       sum.information(0, 0) / information_of_rough_ends(0.0F, Pose{}).information(0, 0), 1.0, 1e-6);
   EXPECT_NEAR(sum.information.ldlt().solve(sum.gradient)[0], 0.2, 1e-6);
+}
+
+/// Floor and ceiling of the room; between them crowns, in which every point has a plane of chance
+/// beside it wherever it is, or upright planes 8 m apart that stay where they are.
+class Grove final : public LocalMap {
+ public:
+  explicit Grove(bool is_solid) : is_solid_(is_solid) {}
+
+  bool match_surface(const Eigen::Vector3d& p, PlaneMatch& plane) const override {
+    if (std::abs(p.z()) < 3.0) {
+      return false;
+    }
+    plane = {Eigen::Vector3d::UnitZ(), p.z() < 0.0 ? 4.0 : -4.0, 1e-4, 0.0};
+    return true;
+  }
+
+  bool match_nearest(const Eigen::Vector3d& p, PlaneMatch& plane) const override {
+    if (is_solid_) {
+      Eigen::Index axis = 0;
+      p.head<2>().cwiseAbs().maxCoeff(&axis);
+      plane = {Eigen::Vector3d::Unit(axis), p[axis] < 0.0 ? 4.0 : -4.0, kCrown2_m2, 0.0};
+      return true;
+    }
+    const VoxelIndex voxel = voxel_index(p.x(), p.y(), p.z(), 5.0);
+    std::mt19937 chance(
+        static_cast<unsigned>(voxel.x * 73856093 ^ voxel.y * 19349663 ^ voxel.z * 83492791));
+    std::uniform_real_distribution<double> angle(0.0, 6.283185307);
+    std::uniform_real_distribution<double> beside_m(-0.1, 0.1);
+    const double a = angle(chance);
+    const Eigen::Vector3d normal(std::cos(a), std::sin(a), 0.0);
+    const Eigen::Vector3d centre = (Eigen::Vector3d(voxel.x, voxel.y, voxel.z).array() + 0.5) / 5.0;
+    plane = {normal, -normal.dot(centre) + beside_m(chance), kCrown2_m2, 0.0};
+    return true;
+  }
+
+  void insert(const PointCloud& /*points_odom*/) override {}
+
+  void prune(const Eigen::Vector3d& /*center_odom_m*/, double /*half_side_m*/) override {}
+
+  void transform(const Pose& /*T_new_old*/) override {}
+
+  void rebuild(const PointCloud& /*points_odom*/) override {}
+
+  PointCloud points() const override { return {}; }
+
+  std::size_t size() const override { return 1; }
+
+  std::size_t memory_bytes() const override { return 0; }
+
+ private:
+  static constexpr double kCrown2_m2 = 0.1 * 0.1;
+  bool is_solid_;
+};
+
+PoseInformation information_of_grove(bool is_solid) {
+  const Grove grove(is_solid);
+  const PointCloud points = room_points();
+  const MatchingConfig config;
+  Workers workers{2};
+  ScanMatcher matcher(points, grove, Pose{}, config, workers);
+  return matcher.linearise(Pose{});
+}
+
+/// Linearised, both promise as much. Displaced by a quarter of a metre only the planes that stay
+/// where they are pull back.
+TEST(ScanMatcher, planes_that_follow_the_scan_hold_nothing) {
+  const Matrix6d crowns = information_of_grove(false).information;
+  const Matrix6d posts = information_of_grove(true).information;
+  for (int axis = 0; axis < 2; ++axis) {
+    EXPECT_GT(posts(axis, axis), 100.0);
+    EXPECT_LT(posts(axis, axis), 1e4) << "so certain that nobody asks";
+    EXPECT_LT(crowns(axis, axis), 0.02 * posts(axis, axis));
+  }
+  EXPECT_NEAR(crowns(2, 2), posts(2, 2), 0.02 * posts(2, 2));
 }
 
 }  // namespace
