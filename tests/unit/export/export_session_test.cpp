@@ -214,6 +214,20 @@ TEST_F(ExportSession, keeps_a_map_on_the_antimeridian_in_one_piece) {
   EXPECT_THAT(kml, AllOf(HasSubstr("<east>180.0001"), HasSubstr("<west>179.9998")));
 }
 
+TEST_F(ExportSession, writes_no_sixtieth_second) {
+  {
+    TrajectoryWriter fused(path_in(session(), session_file::kFused), "base_link in map");
+    fused.append(1'700'000'039'999'600'000, Pose{});  // 22:13:59.9996
+    fused.append(1'700'000'045'123'400'000, Pose{});
+  }
+  write_datum(path_in(session(), session_file::kDatum), {43.9, -78.9, 100.0});
+  export_session(session(), out(), {{"gpx", "geojson"}});
+  EXPECT_THAT(read_all(out("trajectories.gpx")),
+              AllOf(HasSubstr("<time>2023-11-14T22:14:00Z</time>"),
+                    HasSubstr("<time>2023-11-14T22:14:05.123Z</time>")));
+  EXPECT_THAT(read_all(out("trajectories.geojson")), HasSubstr("2023-11-14T22:14:00Z"));
+}
+
 /// While it lives no file of this process grows beyond `bytes`: as on a disk that fills up.
 class SmallDisk {
  public:
