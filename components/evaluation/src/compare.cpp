@@ -150,8 +150,10 @@ Compared compare(const Estimate& estimate,
   const Association association =
       reference.kind == ReferenceKind::kPoses
           ? associate(estimate.trajectory, reference.trajectory, largest_gap_ns)
-          : associate_fixes(
-                estimate.trajectory, reference.trajectory, reference.antenna_position_base_m);
+          : associate_fixes(estimate.trajectory,
+                            reference.trajectory,
+                            reference.antenna_position_base_m,
+                            largest_gap_ns);
   Compared compared;
   compared.evaluation = evaluate_pairs(association, reference.kind, options);
   compared.evaluation.estimate_name = estimate.name;

@@ -69,6 +69,24 @@ TEST(Comparison, takes_a_session_as_the_reference_of_a_file_with_its_lever_arm_a
   EXPECT_EQ(file.blocks[0].compared[0].evaluation.outages.size(), 1U);
 }
 
+TEST(Comparison, takes_the_same_gap_for_fixes_as_for_poses) {
+  const TemporaryFolder folder;
+  test::make_session(folder.path("s"));
+  const Trajectory fused = exporter::read_trajectory(folder.path("s") + "/fused.tum");
+  {
+    exporter::TrajectoryWriter sparse(folder.path("sparse.tum"), "base_link in map");
+    for (std::size_t i = 5; i < fused.size(); i += 10) {  // 0.5 s from each fix
+      sparse.append(fused[i].stamp_ns, fused[i].pose);
+    }
+  }
+  ComparisonInput input{folder.path("sparse.tum"), folder.path("s"), "", ""};
+  EXPECT_EQ(compare(input).blocks.size(), 1U) << "no fix has a pose nearer than 0.1 s";
+  input.largest_gap_ns = 500'000'000;
+  const Comparison wide = compare(input);
+  ASSERT_EQ(wide.blocks.size(), 3U);
+  EXPECT_GT(wide.blocks[2].compared[0].evaluation.pairs, 80U);
+}
+
 TEST(Comparison, of_a_session_without_truth_says_so) {
   const TemporaryFolder folder;
   test::make_session(folder.path("s"), false);
