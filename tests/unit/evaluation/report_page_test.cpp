@@ -14,7 +14,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <regex>
 #include <set>
@@ -171,6 +173,168 @@ TEST(ReportPage, has_every_part_of_a_whole_session) {
     EXPECT_THAT(page, HasSubstr("id=\"" + id + "\""));
   }
   EXPECT_THAT(page, HasSubstr("dropout 1: 20.0 s"));
+}
+
+/// A plot of the page, read back as a person reads it: in the numbers of its axes.
+class PlotOfPage {
+ public:
+  PlotOfPage(const std::string& page, const std::string& id) {
+    const auto from = page.find("id=\"" + id + "\"");
+    text_ = from == std::string::npos ? "" : page.substr(from, page.find("</figure>", from) - from);
+  }
+
+  const std::string& text() const { return text_; }
+
+  /// The points of the first curve with this class.
+  std::vector<Eigen::Vector2d> curve(const std::string& style) const {
+    const auto at = text_.find("<path class=\"" + style + "\" data-title=");
+    if (at == std::string::npos) {
+      return {};
+    }
+    const auto begin = text_.find(" d=\"", at) + 4;
+    std::string path = text_.substr(begin, text_.find('"', begin) - begin);
+    std::vector<Eigen::Vector2d> points;
+    Eigen::Vector2d pen = Eigen::Vector2d::Zero();
+    bool is_relative = false;
+    for (std::size_t i = 0; i < path.size();) {
+      const char c = path[i];
+      if (c == 'M' || c == 'l' || c == 'h' || c == ' ') {
+        is_relative = c == 'l' || (c == ' ' && is_relative);
+        if (c == 'h') {  // a dot's "h0"
+          i += 2;
+          continue;
+        }
+        ++i;
+      }
+      std::size_t used = 0;
+      const double x = std::stod(path.substr(i, 24), &used);
+      i += used + 1;
+      const double y = std::stod(path.substr(i, 24), &used);
+      i += used;
+      pen = is_relative ? Eigen::Vector2d(pen + Eigen::Vector2d(x, y)) : Eigen::Vector2d(x, y);
+      points.push_back(in_numbers(pen));
+    }
+    return points;
+  }
+
+  struct Bar {
+    double from{0.0};
+    double to{0.0};
+  };
+
+  /// Of the rectangles with this class, where they begin and end.
+  std::vector<Bar> bars(const std::string& style) const {
+    static const std::regex kRect(
+        R"re(class="band ([^"]*)"[^>]*? x="(\d+)"[^>]*? width="(\d+)")re");
+    std::vector<Bar> bars;
+    for (std::sregex_iterator at(text_.begin(), text_.end(), kRect), end; at != end; ++at) {
+      if ((*at)[1] == style) {
+        const double left = std::stod((*at)[2]);
+        bars.push_back(
+            {in_numbers({left, 0.0}).x(), in_numbers({left + std::stod((*at)[3]), 0.0}).x()});
+      }
+    }
+    return bars;
+  }
+
+ private:
+  double number(const std::string& name) const {
+    const auto at = text_.find(name + "=\"") + name.size() + 2;
+    return std::stod(text_.substr(at, 24));
+  }
+
+  Eigen::Vector2d in_numbers(const Eigen::Vector2d& drawn) const {
+    const double height = std::stod(text_.substr(text_.find("viewBox=\"0 0 20000 ") + 19, 12));
+    const double x0 = number("data-x0");
+    const double y0 = number("data-y0");
+    const double y1 = number("data-y1");
+    const double up = 1.0 - drawn.y() / height;
+    return {x0 + (number("data-x1") - x0) * drawn.x() / 20'000.0,
+            number("data-log") > 0.0 ? y0 * std::pow(y1 / y0, up) : y0 + (y1 - y0) * up};
+  }
+
+  std::string text_;
+};
+
+TEST(ReportPage, draws_sigma_threshold_choices_and_dropouts_where_the_session_has_them) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  const std::string page = page_of(folder.path());
+  constexpr double kPixel_s = 0.01;
+  constexpr double kShare = 0.01;
+  const std::map<std::string, double> thresholds_m{{"east", 0.5}, {"north", 0.5}, {"up", 1.0}};
+  for (const auto& [axis, threshold_m] : thresholds_m) {
+    const PlotOfPage plot(page, "sigma-" + axis);
+    // Sigma is 0.05 + 0.6 (t - 60) in the outage, rows come every 0.2 s: above 0.5 from 60.8 on.
+    const double over_s = threshold_m == 0.5 ? 60.8 : 61.6;
+    const auto expect_bars = [&](const std::string& style,
+                                 const std::vector<std::pair<double, double>>& expected) {
+      const auto bars = plot.bars(style);
+      ASSERT_EQ(bars.size(), expected.size()) << axis << " " << style;
+      for (std::size_t i = 0; i < bars.size(); ++i) {
+        EXPECT_NEAR(bars[i].from, expected[i].first, kPixel_s) << axis << " " << style;
+        EXPECT_NEAR(bars[i].to, expected[i].second, kPixel_s) << axis << " " << style;
+      }
+    };
+    expect_bars("choice-none", {{0.0, 10.0}});
+    expect_bars("choice-fused", {{10.0, over_s}, {80.0, 120.0}});
+    expect_bars("choice-lio", {{over_s, 80.0}});
+    expect_bars("dropout", {{60.0, 80.0}});
+    const auto thresholds = plot.curve("line threshold");
+    ASSERT_FALSE(thresholds.empty()) << axis;
+    for (const auto& point : thresholds) {
+      EXPECT_NEAR(point.y(), threshold_m, kShare * threshold_m) << axis;
+    }
+    const auto sigma = plot.curve("line gps");
+    ASSERT_FALSE(sigma.empty()) << axis;
+    const auto peak = *std::max_element(
+        sigma.begin(), sigma.end(), [](auto& a, auto& b) { return a.y() < b.y(); });
+    EXPECT_NEAR(peak.x(), 79.8, kPixel_s) << axis;
+    EXPECT_NEAR(peak.y(), 0.05 + 12.0 * 0.99, kShare * 12.0) << axis;
+  }
+}
+
+TEST(ReportPage, has_a_dot_for_each_fix_in_the_row_of_its_verdict) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  auto rows = exporter::read_gate_log(folder.file("gate.csv"));
+  const Nanoseconds start_ns = rows.front().stamp_ns;
+  const auto at = [&](int t_s) { return start_ns + from_seconds(t_s); };
+  rows.front().judged = {{at(1), true, "rows: east sigma 0.1 m"},
+                         {at(2), true, "rows: east sigma 0.2 m"},
+                         {at(3), false, "1.75 s old; limit 1.5 s"},
+                         {at(2), false, "refused by eskf18: duplicate_stamp"}};
+  rows.front().verdict = rows.front().judged.back();
+  std::filesystem::remove(folder.file("gate.csv"));
+  exporter::GateLog gate(folder.file("gate.csv"));
+  for (const FusionStatus& row : rows) {
+    gate.append(row);
+  }
+  const PlotOfPage plot(page_of(folder.path()), "verdicts");
+  const auto used = plot.curve("dots used");
+  const auto refused = plot.curve("dots refused");
+  constexpr double kPixel = 0.01;
+  ASSERT_EQ(used.size(), 2U);
+  ASSERT_EQ(refused.size(), 1U);
+  EXPECT_NEAR(used[0].x(), 1.0, kPixel);
+  EXPECT_NEAR(used[1].x(), 2.0, kPixel) << "a fix that came once more was used all the same";
+  EXPECT_NEAR(refused[0].x(), 3.0, kPixel);
+  EXPECT_NEAR(used[0].y(), 1.25, kPixel) << "the most frequent kind is the upper row";
+  EXPECT_NEAR(refused[0].y(), 0.25, kPixel);
+  const auto upper = plot.text().find("used, rows for the mapper");
+  ASSERT_NE(upper, std::string::npos);
+  EXPECT_LT(upper, plot.text().find("n s old"));
+}
+
+TEST(ReportPage, draws_what_was_published_east_to_the_right_and_north_up) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  const auto fused = exporter::read_trajectory(folder.file("fused.tum"));
+  const auto drawn = PlotOfPage(page_of(folder.path()), "top-view").curve("line fused");
+  ASSERT_FALSE(drawn.empty());
+  constexpr double kUnit_m = 0.02;
+  EXPECT_LT((drawn.front() - fused.front().pose.p.head<2>()).norm(), kUnit_m);
+  EXPECT_LT((drawn.back() - fused.back().pose.p.head<2>()).norm(), 2.0 * kUnit_m);
 }
 
 TEST(ReportPage, has_restarts_as_a_part_of_their_own) {
