@@ -260,5 +260,18 @@ TEST(Reproduction, draws_both_pictures_and_says_when_it_cannot) {
   EXPECT_THAT(again.problems, ElementsAre(HasSubstr("gnuplot-nox")));
 }
 
+TEST(Reproduction, draws_a_drive_with_a_quote_in_its_name_and_without_a_word_of_the_gate) {
+  MadeDrive made;
+  const ScratchFolder out;
+  made.drive.name = "bob's lane";
+  for (const char* mode : {"lio", "literal"}) {
+    std::filesystem::remove(made.folder.file(mode) + "/gate.csv");
+  }
+  DriveFigures figures = score(made.drive);
+  draw(figures, out.path());
+  EXPECT_THAT(figures.problems, IsEmpty());
+  EXPECT_EQ(figures.pictures.size(), 2U);
+}
+
 }  // namespace
 }  // namespace trigpoint::evaluation
