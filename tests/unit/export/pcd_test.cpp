@@ -95,6 +95,7 @@ TEST(Pcd, that_is_none_is_named) {
   for (const char* name : {"text.pcd", "cut.pcd"}) {
     EXPECT_THAT(error_of([&] { visit_pcd(folder.file(name), [](const auto&, double) {}); }),
                 testing::AllOf(HasSubstr(name), HasSubstr("not a readable PCD")));
+    EXPECT_THAT(error_of([&] { read_pcd(folder.file(name)); }), HasSubstr("not a readable PCD"));
   }
 }
 
