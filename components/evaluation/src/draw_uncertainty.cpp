@@ -219,7 +219,7 @@ class UncertaintyPicture {
                  curve("fused.z", "fused", heights(data_.fused), "lines lw 4 lc rgb '#17853c'"),
                  // Last and thinner: where the two agree both are seen.
                  curve("lio.z",
-                       T_map_odom ? "lio (yaw + t)" : "lio (odom)",
+                       lio_title(T_map_odom.has_value()),
                        heights(data_.lio, T_map_odom.value_or(Pose{})),
                        "lines lw 1.5 lc rgb '#e8772e'")});
   }
@@ -231,7 +231,7 @@ class UncertaintyPicture {
            plot({curve("gps.error", "gps filter", errors(data_.gps), "lines lw 1 lc rgb '#1f6fbf'"),
                  curve("fused.error", "fused", errors(data_.fused), "lines lw 4 lc rgb '#17853c'"),
                  T_map_odom ? curve("lio.error",
-                                    "lio (yaw + t)",
+                                    lio_title(true),
                                     errors(data_.lio, *T_map_odom),
                                     "lines lw 1.5 lc rgb '#e8772e'")
                             : std::string()});

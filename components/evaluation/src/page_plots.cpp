@@ -151,7 +151,7 @@ std::vector<PlotCurve> estimates(const Points& gps,
   return {{"gps", "gps filter", gps},
           {"fused", "fused", fused},
           // Last and thinner: where the two agree both are seen.
-          {"lio", is_lio_in_map ? "lio (yaw + translation)" : "lio (odom)", lio}};
+          {"lio", lio_title(is_lio_in_map), lio}};
 }
 
 /// The most frequent kinds first.

@@ -168,17 +168,7 @@ std::string subtitle(const SessionData& data) {
 
 }  // namespace
 
-std::string make_page(const SessionData& data, const PageContent& content) {
-  auto problems = content.problems;
-  PointCloud map;
-  try {
-    map = map_under(data);
-  } catch (const std::exception& error) {
-    const std::string problem = std::string(error.what()) + ".";
-    if (std::find(problems.begin(), problems.end(), problem) == problems.end()) {
-      problems.push_back(problem);
-    }
-  }
+std::string make_page(const SessionData& data, const PointCloud& map, const PageContent& content) {
   const std::string name = name_of_session(data);
   std::string nav;
   std::string body;
@@ -188,13 +178,14 @@ std::string make_page(const SessionData& data, const PageContent& content) {
     body +=
         "<section id=\"" + part.id + "\">\n<h2>" + title + "</h2>\n" + part.body + "</section>\n";
   }
-  return html_of(
-      {name + " - Trigpoint session report",
-       "<header><p class=\"kind\">Trigpoint session report</p><h1>" + html::escape(name) +
-           "</h1>\n<p>" + html::escape(subtitle(data)) + "</p>\n</header>\n<nav>" + nav +
-           "</nav>\n<main>\n" + note("failed", "Failed", content.failures) +
-           note("problem", "Problems", problems) + tiles(data, content) + body + "</main>\n",
-       {page_files::kPlots, page_files::kMap3d}});
+  return html_of({name + " - Trigpoint session report",
+                  "<header><p class=\"kind\">Trigpoint session report</p><h1>" +
+                      html::escape(name) + "</h1>\n<p>" + html::escape(subtitle(data)) +
+                      "</p>\n</header>\n<nav>" + nav + "</nav>\n<main>\n" +
+                      note("failed", "Failed", content.failures) +
+                      note("problem", "Problems", content.problems) + tiles(data, content) + body +
+                      "</main>\n",
+                  {page_files::kPlots, page_files::kMap3d}});
 }
 
 }  // namespace trigpoint::evaluation
