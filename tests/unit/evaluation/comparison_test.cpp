@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 
 namespace trigpoint::evaluation {
@@ -67,6 +68,19 @@ TEST(Comparison, takes_a_session_as_the_reference_of_a_file_with_its_lever_arm_a
               whole.blocks[i].compared[0].evaluation.scores[0].error.position_m.rmse);
   }
   EXPECT_EQ(file.blocks[0].compared[0].evaluation.outages.size(), 1U);
+}
+
+TEST(Comparison, of_a_session_names_once_what_could_not_be_read) {
+  const TemporaryFolder folder;
+  test::make_session(folder.path("s"));
+  tests::write_file(folder.path("s/fused.tum"), "1.0 no pose\n");
+  const Comparison comparison = compare({folder.path("s"), "", "", ""});
+  EXPECT_THAT(names_of(comparison.blocks.at(0)), testing::Not(Contains("fused.tum")));
+  EXPECT_EQ(std::count_if(comparison.remarks.begin(),
+                          comparison.remarks.end(),
+                          [](const auto& r) { return r.find("fused.tum:1") != std::string::npos; }),
+            1);
+  EXPECT_THAT(print(comparison), HasSubstr("fused.tum:1"));
 }
 
 TEST(Comparison, takes_the_same_gap_for_fixes_as_for_poses) {
