@@ -168,7 +168,8 @@ TEST(ReportPage, has_a_dot_for_each_fix_in_the_row_of_its_verdict) {
   for (const FusionStatus& row : rows) {
     gate.append(row);
   }
-  const PlotOfPage plot(page_of(folder.path()), "verdicts");
+  const std::string page = page_of(folder.path());
+  const PlotOfPage plot(page, "verdicts");
   const auto used = plot.curve("dots used");
   const auto refused = plot.curve("dots refused");
   constexpr double kPixel = 0.01;
@@ -182,17 +183,26 @@ TEST(ReportPage, has_a_dot_for_each_fix_in_the_row_of_its_verdict) {
   const auto upper = plot.text().find("used, rows for the mapper");
   ASSERT_NE(upper, std::string::npos);
   EXPECT_LT(upper, plot.text().find("n s old"));
+  // The made fix of that second has the antenna where truth has it, 0.6 m from base_link.
+  const auto seen_from_above = PlotOfPage(page, "top-view").curve("dots refused");
+  ASSERT_EQ(seen_from_above.size(), 1U);
+  const Eigen::Vector3d base = exporter::read_trajectory(folder.file("truth.tum")).at(60).pose.p;
+  EXPECT_NEAR((seen_from_above[0] - base.head<2>()).norm(), std::hypot(0.5, 0.2), 0.05);
 }
 
 TEST(ReportPage, draws_what_was_published_east_to_the_right_and_north_up) {
   const ScratchFolder folder;
   make_session(folder.path());
   const auto fused = exporter::read_trajectory(folder.file("fused.tum"));
-  const auto drawn = PlotOfPage(page_of(folder.path()), "top-view").curve("line fused");
+  const std::string page = page_of(folder.path());
+  const auto drawn = PlotOfPage(page, "top-view").curve("line fused");
   ASSERT_FALSE(drawn.empty());
   constexpr double kUnit_m = 0.02;
   EXPECT_LT((drawn.front() - fused.front().pose.p.head<2>()).norm(), kUnit_m);
   EXPECT_LT((drawn.back() - fused.back().pose.p.head<2>()).norm(), 2.0 * kUnit_m);
+  const auto heights = PlotOfPage(page, "height").curve("line fused");
+  ASSERT_FALSE(heights.empty());
+  EXPECT_LT((heights.front() - Eigen::Vector2d(10.0, fused.front().pose.p.z())).norm(), kUnit_m);
 }
 
 /// RFC 4648, without its checks.
