@@ -297,5 +297,22 @@ TEST_F(ExportSession, places_lio_once_so_that_its_drift_shows) {
   EXPECT_THAT(lio_line, HasSubstr("[ 3.000125764, 0.000001"));  // 14 m
 }
 
+TEST_F(ExportSession, places_lio_at_the_very_moment_of_the_first_published_pose) {
+  // Both drive east at 10 m/s; fused begins between two scans, 20 ms before the second.
+  TrajectoryWriter fused(path_in(session(), session_file::kFused), "base_link in map");
+  TrajectoryWriter lio(path_in(session(), session_file::kLio), "base_link in odom");
+  const auto at = [](double x_m) { return Pose(Eigen::Quaterniond::Identity(), {x_m, 0.0, 0.0}); };
+  lio.append(1'000'000'000, at(0.0));
+  lio.append(1'100'000'000, at(1.0));
+  fused.append(1'080'000'000, at(100.8));
+  fused.append(1'100'000'000, at(101.0));
+  write_datum(path_in(session(), session_file::kDatum), {1e-6, 3.0, 0.0});
+  export_session(session(), out(), {{"geojson"}});
+  const std::string text = read_all(out("trajectories.geojson"));
+  // 100 m and 101 m at 8.98315e-6 degrees each.
+  EXPECT_THAT(text.substr(text.find("\"lio\"")),
+              AllOf(HasSubstr("[ 3.000898315"), HasSubstr("[ 3.000907298")));
+}
+
 }  // namespace
 }  // namespace trigpoint::exporter
