@@ -172,6 +172,11 @@ TEST(Comparison, is_drawn_for_each_reference) {
   test::make_session(folder.path("s"));
   const auto pictures = draw(compare({folder.path("s"), "", "", ""}), folder.path("pictures"));
   EXPECT_EQ(pictures.size(), 9U);
+  tests::write_file(folder.path("bob's.tum"), tests::read_file(folder.path("s/fused.tum")));
+  EXPECT_EQ(draw(compare({folder.path("bob's.tum"), folder.path("bob's.tum"), "", ""}),
+                 folder.path("quoted"))
+                .size(),
+            3U);
   for (const std::string& picture : pictures) {
     EXPECT_GT(std::filesystem::file_size(picture), 5000U) << picture;
   }

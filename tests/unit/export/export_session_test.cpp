@@ -6,12 +6,11 @@
 #include "trigpoint/lio_mapper/keyframe_store.hpp"
 
 #include "scratch_folder.hpp"
+#include "small_disk.hpp"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include <cmath>
-#include <csignal>
 
 namespace trigpoint::exporter {
 namespace {
@@ -23,6 +22,7 @@ using test::write_all;
 using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
+using tests::SmallDisk;
 
 constexpr float kFloat_m = 1e-4F;
 
@@ -227,28 +227,6 @@ TEST_F(ExportSession, writes_no_sixtieth_second) {
                     HasSubstr("<time>2023-11-14T22:14:05.123Z</time>")));
   EXPECT_THAT(read_all(out("trajectories.geojson")), HasSubstr("2023-11-14T22:14:00Z"));
 }
-
-/// While it lives no file of this process grows beyond `bytes`: as on a disk that fills up.
-class SmallDisk {
- public:
-  explicit SmallDisk(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    ::getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit limit{bytes, before_.rlim_max};
-    ::setrlimit(RLIMIT_FSIZE, &limit);
-  }
-
-  ~SmallDisk() {
-    ::setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-
-  SmallDisk(const SmallDisk&) = delete;
-  SmallDisk& operator=(const SmallDisk&) = delete;
-
- private:
-  rlimit before_{};
-  void (*handler_)(int);
-};
 
 TEST_F(ExportSession, names_the_file_that_the_disk_had_no_room_for_and_leaves_no_part_of_it) {
   PointCloud cloud;
