@@ -171,7 +171,7 @@ std::string print_step(const SessionData& data) {
          " intervals" +
          (unjudged == 0 ? ""
                         : "; " + std::to_string(unjudged) +
-                              " more are not judged, since lio.tum has a gap there") +
+                              " more are not judged, since lio.tum has no pose near them") +
          ".\n";
 }
 

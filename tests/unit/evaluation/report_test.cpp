@@ -115,7 +115,7 @@ TEST(Report, tells_how_many_steps_it_could_not_judge) {
   }
   EXPECT_THAT(
       write_report(folder.path(), kNoPictures).text,
-      HasSubstr("of 1089 intervals; 11 more are not judged, since lio.tum has a gap there."));
+      HasSubstr("of 1089 intervals; 11 more are not judged, since lio.tum has no pose near them."));
 }
 
 TEST(Report, scores_lio_aligned_since_it_lives_in_odom) {
