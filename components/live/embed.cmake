@@ -1,5 +1,6 @@
 # cmake -DOUTPUT=... -DPAGE_FOLDER=... -P embed.cmake
 # Writes embedded.cpp: index.html with the scripts that it names put in place.
+include("${CMAKE_CURRENT_LIST_DIR}/../../cmake/embedded_text.cmake")
 file(READ "${PAGE_FOLDER}/index.html" page)
 file(GLOB scripts "${PAGE_FOLDER}/*.js")
 foreach(script ${scripts})
@@ -10,15 +11,4 @@ endforeach()
 if(page MATCHES "<script src=")
   message(FATAL_ERROR "index.html names a script that is not beside it")
 endif()
-file(WRITE "${OUTPUT}"
-"// Written by embed.cmake.
-#include \"embedded.hpp\"
-
-namespace trigpoint::live {
-
-std::string_view embedded_page() {
-  return R\"embedded~(${page})embedded~\";
-}
-
-}  // namespace trigpoint::live
-")
+write_embedded_text("${OUTPUT}" embedded.hpp trigpoint::live embedded_page "${page}")

@@ -353,8 +353,12 @@ TEST(Command, export_writes_what_it_can_and_fails_for_what_was_asked_for_and_can
   tests::write_file(session + "/datum.yaml",
                     "latitude_deg: 43.9\nlongitude_deg: -78.9\nheight_m: 100\nelected_ns: 0\n");
   const CommandResult again = trigpoint({"export", session});
-  EXPECT_EQ(again.exit_code, 1);
+  EXPECT_EQ(again.exit_code, 2);
   EXPECT_THAT(again.output, HasSubstr("fused.csv already"));
+  EXPECT_EQ(trigpoint({"export", session, "--out", session}).exit_code, 2);
+  EXPECT_EQ(trigpoint({"export", session, "--out", folder.path("t"), "--tile", "0.5"}).exit_code,
+            2);
+  EXPECT_FALSE(fs::exists(folder.path("t")));
   const CommandResult all = trigpoint({"export", session, "--out", folder.path("all")});
   EXPECT_EQ(all.exit_code, 0) << all.output;
   EXPECT_THAT(all.output, AllOf(HasSubstr("session.kmz"), HasSubstr("no map"), HasSubstr("100 %")));

@@ -76,6 +76,18 @@ class LiveCommand : public ::testing::Test {
     return 0;
   }
 
+  /// Those of the command on a topic, once there are as many as wanted.
+  std::vector<bus::DiscoveredEndpoint> readers_of(const std::string& topic, std::size_t wanted) {
+    const auto end = std::chrono::steady_clock::now() + kForever;
+    std::vector<bus::DiscoveredEndpoint> found;
+    do {
+      found = participant_->discovered();
+      std::erase_if(found, [&](const auto& e) { return e.writes || e.dds_topic != "rt/" + topic; });
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    } while (found.size() != wanted && std::chrono::steady_clock::now() < end);
+    return found;
+  }
+
   tests::Command command_;
 
  private:
@@ -109,6 +121,19 @@ TEST_F(LiveCommand, passes_on_what_is_on_the_bus_byte_for_byte_and_ends_with_ctr
   EXPECT_EQ(message->bytes.substr(13), std::string(expected.begin(), expected.end()));
   command_.signal(SIGINT);
   EXPECT_EQ(command_.wait(kForever).exit_code, 0);
+}
+
+TEST_F(LiveCommand, reads_clouds_only_while_somebody_looks_and_asks_no_writer_to_repeat_one) {
+  WsClient client(port(), "foxglove.sdk.v1");
+  const auto channels = offered(client);
+  EXPECT_TRUE(readers_of("cloud_registered", 0).empty());
+  client.send_text(R"({"op":"subscribe","subscriptions":[{"id":1,"channelId":)" +
+                   std::to_string(channels.at("/cloud_registered").first) + "}]}");
+  const auto readers = readers_of("cloud_registered", 1);
+  ASSERT_EQ(readers.size(), 1U);
+  EXPECT_EQ(readers.front().reliability, bus::Reliability::kBestEffort);
+  client.send_text(R"({"op":"unsubscribe","subscriptionIds":[1]})");
+  EXPECT_TRUE(readers_of("cloud_registered", 0).empty());
 }
 
 /// Every string of a document that begins with '/'.

@@ -84,6 +84,15 @@ DriveToRun bag_drive(const ReproduceOptions& options,
   return drive;
 }
 
+/// Both would be written into one folder.
+void refuse_doubles(const std::string& option, std::vector<std::string> names) {
+  std::sort(names.begin(), names.end());
+  const auto twice = std::adjacent_find(names.begin(), names.end());
+  if (twice != names.end()) {
+    throw ConfigError(option + ": " + *twice + " is named twice");
+  }
+}
+
 void check(const ReproduceOptions& options) {
   if (options.quick && options.duration_s > 0.0) {
     throw ConfigError("--quick is a --duration of its own: leave one of them out");
@@ -91,13 +100,7 @@ void check(const ReproduceOptions& options) {
   if (!options.no_withheld && options.withhold_for_s >= options.withhold_every_s) {
     throw ConfigError("--withhold-for must be less than --withhold-every: nothing would be fed");
   }
-  for (std::size_t i = 0; i < options.modes.size(); ++i) {
-    const auto begin = options.modes.begin();
-    if (std::find(begin, begin + static_cast<std::ptrdiff_t>(i), options.modes[i]) !=
-        begin + static_cast<std::ptrdiff_t>(i)) {
-      throw ConfigError("--modes: " + options.modes[i] + " is named twice");
-    }
-  }
+  refuse_doubles("--modes", options.modes);
   if (fs::exists(exporter::path_in(options.out, "reproduction.json"))) {
     throw ConfigError("--out: " + options.out +
                       " holds a reproduction already; name another folder, or remove it");
@@ -106,13 +109,11 @@ void check(const ReproduceOptions& options) {
 }
 
 void check_names(const std::vector<DriveToRun>& drives) {
-  for (std::size_t i = 0; i < drives.size(); ++i) {
-    for (std::size_t k = 0; k < i; ++k) {
-      if (drives[i].about.name == drives[k].about.name) {
-        throw ConfigError("--drives: " + drives[i].about.name + " is named twice");
-      }
-    }
+  std::vector<std::string> names;
+  for (const DriveToRun& drive : drives) {
+    names.push_back(drive.about.name);
   }
+  refuse_doubles("--drives", std::move(names));
 }
 
 }  // namespace

@@ -140,10 +140,11 @@ void add_evaluate(CLI::App& app, Chosen& chosen) {
   verb->add_option(
           "--fixes", options->input.fixes_file, "fixes.csv of the session: errors in GPS outages")
       ->check(CLI::ExistingFile);
-  verb->add_option("--gap",
-                   options->largest_gap_s,
-                   "poses of the reference farther than this from an estimate's moment are not "
-                   "interpolated, s")
+  verb->add_option(
+          "--gap",
+          options->largest_gap_s,
+          "poses farther than this from the moment asked for are not interpolated, s: those "
+          "of the reference, and of the estimate where fixes are the reference")
       ->capture_default_str()
       ->check(more_than_zero());
   verb->footer(

@@ -150,8 +150,10 @@ Compared compare(const Estimate& estimate,
   const Association association =
       reference.kind == ReferenceKind::kPoses
           ? associate(estimate.trajectory, reference.trajectory, largest_gap_ns)
-          : associate_fixes(
-                estimate.trajectory, reference.trajectory, reference.antenna_position_base_m);
+          : associate_fixes(estimate.trajectory,
+                            reference.trajectory,
+                            reference.antenna_position_base_m,
+                            largest_gap_ns);
   Compared compared;
   compared.evaluation = evaluate_pairs(association, reference.kind, options);
   compared.evaluation.estimate_name = estimate.name;
@@ -161,6 +163,16 @@ Compared compare(const Estimate& estimate,
   compared.pairs = association.pairs;
   compared.is_in_reference_frame = estimate.is_in_map;
   return compared;
+}
+
+/// A file of the session that cannot be read must not be missing in silence.
+void add_problems(const SessionData& session, Comparison& comparison) {
+  auto& remarks = comparison.remarks;
+  for (const std::string& problem : session.problems) {
+    if (std::find(remarks.begin(), remarks.end(), problem) == remarks.end()) {
+      remarks.push_back(problem);
+    }
+  }
 }
 
 /// What is to be compared, read.
@@ -183,6 +195,7 @@ Sides read_sides(const ComparisonInput& input, Comparison& comparison) {
   std::optional<PoseFile> estimate_file;
   if (estimate_is_session) {
     const SessionData session = load_session(input.estimate, {});
+    add_problems(session, comparison);
     sides.estimates = estimates_of(session);
     sides.outages = session.outages();
   } else {
@@ -201,6 +214,7 @@ Sides read_sides(const ComparisonInput& input, Comparison& comparison) {
                 reference_file ? &*reference_file : nullptr);
   if (reference_is_session) {
     const SessionData session = load_session(reference, {});
+    add_problems(session, comparison);
     sides.references = references_of(session, comparison);
     sides.outages = session.outages();
   } else {

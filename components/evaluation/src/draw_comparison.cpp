@@ -31,11 +31,8 @@ std::string word_of(const std::string& name) {
   return word;
 }
 
-/// As a title within single quotes.
 std::string title_of(const std::string& name) {
-  std::string title = name.substr(name.find_last_of('/') + 1);
-  std::erase(title, '\'');
-  return title;
+  return name.substr(name.find_last_of('/') + 1);
 }
 
 /// The pairs of one estimate, aligned.
@@ -106,8 +103,10 @@ std::string draw_errors(const ComparisonBlock& block,
   }
   constexpr std::array<const char*, 4> kAxes{"x (E) [m]", "y (N) [m]", "z (U) [m]", "3-D [m]"};
   std::ostringstream body;
-  body << "set multiplot layout 4,1 title 'Position error against "
-       << title_of(block.reference_name) << ", alignment: " << name_of(kind) << "' noenhanced\n"
+  body << "set multiplot layout 4,1 title "
+       << quoted("Position error against " + title_of(block.reference_name) +
+                 ", alignment: " + name_of(kind))
+       << " noenhanced\n"
        << "set grid lc rgb '#cccccc'\nset tics out nomirror\nset lmargin 10\nset rmargin 3\n"
        << "set key outside top center horizontal noenhanced\n";
   for (std::size_t axis = 0; axis < kAxes.size(); ++axis) {
@@ -116,7 +115,7 @@ std::string draw_errors(const ComparisonBlock& block,
          << (axis == 1 ? "unset key\n" : "") << "plot ";
     for (std::size_t i = 0; i < files.size(); ++i) {
       body << (i == 0 ? "" : ", ") << files[i] << " using 1:" << axis + 2 << " with lines"
-           << curves[i].style << " title '" << curves[i].title << "'";
+           << curves[i].style << " title " << quoted(curves[i].title);
     }
     body << "\n";
   }
@@ -150,15 +149,15 @@ std::string draw_top_view(const ComparisonBlock& block,
   const bool is_positions =
       block.compared.front().evaluation.reference_kind == ReferenceKind::kPositions;
   body << picture.data(name + "_reference.xy", reference) << " using 1:2 with "
-       << (is_positions ? "points pt 6 ps 0.8" : "lines lw 7") << " lc rgb '#f2c230' title '"
-       << title_of(block.reference_name) << "'";
+       << (is_positions ? "points pt 6 ps 0.8" : "lines lw 7") << " lc rgb '#f2c230' title "
+       << quoted(title_of(block.reference_name));
   for (std::size_t i = 0; i < curves.size(); ++i) {
     DataFile rows;
     for (const PosePair& pair : curves[i].pairs) {
       rows.add({pair.estimate.p.x(), pair.estimate.p.y()});
     }
     body << ", " << picture.data(name + "_" + word_of(curves[i].title) + ".xy", rows)
-         << " using 1:2 with lines" << curves[i].style << " title '" << curves[i].title << "'";
+         << " using 1:2 with lines" << curves[i].style << " title " << quoted(curves[i].title);
   }
   body << "\n";
   return picture.draw(gnuplot, kWidth_px, 900, body.str());

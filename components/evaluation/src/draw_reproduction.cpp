@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <functional>
 #include <optional>
 #include <sstream>
@@ -198,8 +199,10 @@ class ReproductionPicture {
   std::string draw_trajectories(const std::string& gnuplot) const {
     const std::vector<Panel> panels = panels_of(content_, figures_.dropouts);
     std::ostringstream body;
-    body << "set multiplot title '" << figures_.drive.name
-         << ": as published in map, no alignment (compare Fig. 7 to 10)' noenhanced\n"
+    body << "set multiplot title "
+         << quoted(figures_.drive.name +
+                   ": as published in map, no alignment (compare Fig. 7 to 10)")
+         << " noenhanced\n"
          << "set size ratio -1\nset grid lc rgb '#dddddd'\nset tics out nomirror\n"
          << "set xlabel 'east [m]'\nset ylabel 'north [m]' offset 1,0\n"
          << "set bmargin at screen 0.3\nset tmargin at screen 0.88\n"
@@ -218,8 +221,10 @@ class ReproductionPicture {
   /// Fig. 11: the path in space, and the uncertainty of each axis with its threshold.
   std::string draw_uncertainty(const std::string& gnuplot) const {
     std::ostringstream body;
-    body << "set multiplot title '" << figures_.drive.name
-         << ": path in space and uncertainty of the GPS odometry (compare Fig. 11)' noenhanced\n"
+    body << "set multiplot title "
+         << quoted(figures_.drive.name +
+                   ": path in space and uncertainty of the GPS odometry (compare Fig. 11)")
+         << " noenhanced\n"
          << "set origin 0,0.5\nset size 1,0.47\nset key at screen 0.985,0.93 right top samplen 3 "
             "noenhanced\nset view 62,32\nset ticslevel 0.05\nset xyplane relative 0.05\n"
          << "set grid lc rgb '#dddddd'\nset xlabel 'east [m]'\nset ylabel 'north [m]'\n"
@@ -323,8 +328,11 @@ class ReproductionPicture {
            << " using 1:2:3:4:5:6 with boxxyerror lc rgb '" << kDropoutColour
            << "' title 'GPS dropout', \\\n     ";
     }
-    text << threshold_m << " with lines lw 1.5 dt 2 lc rgb '#c00000' title 'threshold', \\\n     "
-         << picture_.data("sigma_" + name + ".dat", sigma)
+    if (std::isfinite(threshold_m)) {
+      text << threshold_m
+           << " with lines lw 1.5 dt 2 lc rgb '#c00000' title 'threshold', \\\n     ";
+    }
+    text << picture_.data("sigma_" + name + ".dat", sigma)
          << " using 1:2 with lines lw 2 lc rgb '#1f6fbf' title 'sigma of GPS odometry'\n";
     return text.str();
   }

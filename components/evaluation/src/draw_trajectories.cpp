@@ -4,6 +4,7 @@
 #include "gnuplot.hpp"
 #include "map_raster.hpp"
 #include "pictures.hpp"
+#include "session_map.hpp"
 
 #include <sstream>
 
@@ -60,14 +61,11 @@ std::vector<Curve> curves_of(const SessionData& data) {
   add({"gps", "gps filter", data.gps, "lines lw 1.5 lc rgb '#1f6fbf'"});
   add({"fused", "fused", data.fused, "lines lw 4.5 lc rgb '#17853c'"});
   // Over the wider fused: where the two agree both are seen.
-  if (const auto T_map_odom = lio_placement(data)) {
-    add({"lio",
-         "lio (yaw + translation)",
-         placed(*T_map_odom, data.lio),
-         "lines lw 1.5 lc rgb '#e8772e'"});
-  } else {
-    add({"lio", "lio (odom, not aligned)", data.lio, "lines lw 1.5 lc rgb '#e8772e'"});
-  }
+  const auto T_map_odom = lio_placement(data);
+  add({"lio",
+       lio_title(T_map_odom.has_value()),
+       placed(T_map_odom.value_or(Pose{}), data.lio),
+       "lines lw 1.5 lc rgb '#e8772e'"});
   if (data.datum) {
     const auto all = fix_positions(data.fixes, *data.datum, FixChoice::kAll);
     const auto withheld = fix_positions(data.fixes, *data.datum, FixChoice::kWithheld);
@@ -110,7 +108,9 @@ int height_for(const Eigen::Vector2d& size_m) {
 
 }  // namespace
 
-std::string draw_trajectories(const SessionData& data, const std::string& gnuplot) {
+std::string draw_trajectories(const SessionData& data,
+                              const PointCloud& map,
+                              const std::string& gnuplot) {
   const Picture picture(data.path(file::kPlots), "trajectories");
   const auto curves = curves_of(data);
   Box box;
@@ -122,14 +122,13 @@ std::string draw_trajectories(const SessionData& data, const std::string& gnuplo
   }
   box.lowest_m.array() -= kMargin_m;
   box.highest_m.array() += kMargin_m;
-  const auto cloud = map_under(data);
   const auto background =
-      cloud.empty()
+      map.empty()
           ? std::string()
-          : raster_command(picture, rasterise(cloud, box.lowest_m, box.highest_m, kMostCells));
+          : raster_command(picture, rasterise(map, box.lowest_m, box.highest_m, kMostCells));
   std::ostringstream body;
-  body << "set title 'Top view: trajectories" << (cloud.empty() ? "" : " over the map")
-       << ", frame " << (data.fused.empty() && data.gps.empty() ? "odom" : "map") << "'\n"
+  body << "set title 'Top view: trajectories" << (map.empty() ? "" : " over the map") << ", frame "
+       << shown_frame(data) << "'\n"
        << "set xlabel 'east [m]' offset 0,0.6\nset ylabel 'north [m]'\n"
        << "set size ratio -1\nset grid lc rgb '#cccccc'\nset tics out nomirror\n"
        << "set key outside below center horizontal\n"

@@ -25,6 +25,11 @@ constexpr std::array<const char*, 3> kAxisFiles{"east.dat", "north.dat", "up.dat
 constexpr std::array<const char*, 4> kSourceColours{"#d9d9d9", "#f7c59f", "#b9e3c0", "#b7d4f0"};
 constexpr const char* kOutageColour = "#8c2d2d";
 
+/// Of lio.tum; lio_title does not fit beside the panels.
+const char* short_title(bool is_placed) {
+  return is_placed ? "lio (yaw + t)" : "lio (odom)";
+}
+
 /// Vertical extent of a panel with a logarithmic scale.
 struct SigmaRange {
   double lowest_m{0.01};
@@ -219,7 +224,7 @@ class UncertaintyPicture {
                  curve("fused.z", "fused", heights(data_.fused), "lines lw 4 lc rgb '#17853c'"),
                  // Last and thinner: where the two agree both are seen.
                  curve("lio.z",
-                       T_map_odom ? "lio (yaw + t)" : "lio (odom)",
+                       short_title(T_map_odom.has_value()),
                        heights(data_.lio, T_map_odom.value_or(Pose{})),
                        "lines lw 1.5 lc rgb '#e8772e'")});
   }
@@ -231,7 +236,7 @@ class UncertaintyPicture {
            plot({curve("gps.error", "gps filter", errors(data_.gps), "lines lw 1 lc rgb '#1f6fbf'"),
                  curve("fused.error", "fused", errors(data_.fused), "lines lw 4 lc rgb '#17853c'"),
                  T_map_odom ? curve("lio.error",
-                                    "lio (yaw + t)",
+                                    short_title(true),
                                     errors(data_.lio, *T_map_odom),
                                     "lines lw 1.5 lc rgb '#e8772e'")
                             : std::string()});

@@ -37,13 +37,14 @@ Trajectory fix_positions(const std::vector<exporter::LoggedFix>& fixes,
 
 Association associate_fixes(const Trajectory& estimate,
                             const Trajectory& fix_positions_map,
-                            const Eigen::Vector3d& antenna_position_base_m) {
+                            const Eigen::Vector3d& antenna_position_base_m,
+                            Nanoseconds largest_gap_ns) {
   Association result;
   const Pose T_base_antenna(Eigen::Quaterniond::Identity(), antenna_position_base_m);
   std::size_t since_first = 0;
   for (const auto& fix : fix_positions_map) {
     since_first += !estimate.empty() && fix.stamp_ns >= estimate.front().stamp_ns ? 1 : 0;
-    if (const auto pose = pose_at(estimate, fix.stamp_ns)) {
+    if (const auto pose = pose_at(estimate, fix.stamp_ns, largest_gap_ns)) {
       result.pairs.push_back({fix.stamp_ns, *pose * T_base_antenna, fix.pose});
     }
   }

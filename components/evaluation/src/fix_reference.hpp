@@ -18,9 +18,11 @@ Trajectory fix_positions(const std::vector<exporter::LoggedFix>& fixes,
                          const Datum& datum,
                          FixChoice choice);
 
-/// The estimate's antenna (pose times lever arm) at the fixes' stamps.
+/// The estimate's antenna (pose times lever arm) at the fixes' stamps; between poses that are
+/// farther apart than pose_at allows there is no pair.
 Association associate_fixes(const Trajectory& estimate,
                             const Trajectory& fix_positions_map,
-                            const Eigen::Vector3d& antenna_position_base_m);
+                            const Eigen::Vector3d& antenna_position_base_m,
+                            Nanoseconds largest_gap_ns = kDefaultGap_ns);
 
 }  // namespace trigpoint::evaluation

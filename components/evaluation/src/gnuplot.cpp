@@ -66,6 +66,14 @@ std::string first_words_of(const std::string& file) {
 
 }  // namespace
 
+std::string quoted(const std::string& text) {
+  std::string inside;
+  for (const char c : text) {
+    inside += c == '\'' ? "''" : std::string(1, c);
+  }
+  return "'" + inside + "'";
+}
+
 void DataFile::add(const std::vector<double>& row) {
   std::string line;
   for (const double value : row) {

@@ -24,6 +24,9 @@ class DataFile {
   std::size_t rows_{0};
 };
 
+/// Text as gnuplot reads it between single quotes, with these.
+std::string quoted(const std::string& text);
+
 /// A picture in the making: script and data go into `folder` (so that a user can run it again:
 /// `cd plots && gnuplot NAME.gp`), the PNG beside that folder.
 class Picture {

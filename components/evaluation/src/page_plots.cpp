@@ -151,7 +151,7 @@ std::vector<PlotCurve> estimates(const Points& gps,
   return {{"gps", "gps filter", gps},
           {"fused", "fused", fused},
           // Last and thinner: where the two agree both are seen.
-          {"lio", is_lio_in_map ? "lio (yaw + translation)" : "lio (odom)", lio}};
+          {"lio", lio_title(is_lio_in_map), lio}};
 }
 
 /// The most frequent kinds first.
@@ -207,8 +207,12 @@ std::string kind_of_verdict(const FixVerdict& verdict) {
 std::vector<FixVerdict> last_verdicts(const SessionData& data) {
   std::map<Nanoseconds, FixVerdict> by_stamp;
   for (const auto& row : data.gate) {
-    if (row.verdict.fix_stamp_ns != 0) {
-      by_stamp[row.verdict.fix_stamp_ns] = row.verdict;
+    if (row.verdict.fix_stamp_ns == 0) {
+      continue;
+    }
+    FixVerdict& kept = by_stamp[row.verdict.fix_stamp_ns];
+    if (!kept.used || row.verdict.used) {
+      kept = row.verdict;
     }
   }
   std::vector<FixVerdict> verdicts;

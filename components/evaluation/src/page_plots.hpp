@@ -29,7 +29,8 @@ std::string plot_scan_times(const SessionData& data);
 /// Of a verdict as gate.csv tells it: without the numbers that make it one of its own.
 std::string kind_of_verdict(const FixVerdict& verdict);
 
-/// The last verdict on each fix that gate.csv tells of.
+/// One verdict on each fix that gate.csv tells of: that it was used, if any says so (a receiver may
+/// repeat a fix), else the last one. In the order of the fixes.
 std::vector<FixVerdict> last_verdicts(const SessionData& data);
 
 }  // namespace trigpoint::evaluation

@@ -148,10 +148,7 @@ std::string tracks_of(const SessionData& data) {
   const auto T_map_odom = lio_placement(data);
   add("truth", "truth", data.truth, Pose{});
   add("gps", "gps filter", data.gps, Pose{});
-  add("lio",
-      T_map_odom ? "lio (yaw + translation)" : "lio (odom)",
-      data.lio,
-      T_map_odom.value_or(Pose{}));
+  add("lio", lio_title(T_map_odom.has_value()), data.lio, T_map_odom.value_or(Pose{}));
   add("fused", "fused", data.fused, Pose{});
   return json::array(tracks);
 }

@@ -6,6 +6,7 @@
 #include "page_plots.hpp"
 #include "pictures.hpp"
 #include "png.hpp"
+#include "session_map.hpp"
 #include "svg_plot.hpp"
 #include "table.hpp"
 
@@ -78,9 +79,8 @@ std::vector<PlotCurve> curves_of(const SessionData& data) {
   curves.push_back({"gps", "gps filter", places(data.gps)});
   curves.push_back({"fused", "fused", places(data.fused)});
   // Over the wider fused: where the two agree both are seen.
-  curves.push_back({"lio",
-                    T_map_odom ? "lio (yaw + translation)" : "lio (odom, not aligned)",
-                    places(data.lio, T_map_odom.value_or(Pose{}))});
+  curves.push_back(
+      {"lio", lio_title(T_map_odom.has_value()), places(data.lio, T_map_odom.value_or(Pose{}))});
   if (data.datum) {
     curves.push_back(fixes_curve(data, false));
     const auto withheld = fix_positions(data.fixes, *data.datum, FixChoice::kWithheld);
@@ -155,10 +155,9 @@ std::string plot_top_view(const SessionData& data, const PointCloud& map) {
   if (!box) {
     return "";
   }
-  const bool is_map = !data.fused.empty() || !data.gps.empty();
   const Eigen::Vector2d size_m = box->high - box->low;
   SvgPlot plot("top-view",
-               std::string("Seen from above, frame ") + (is_map ? "map" : "odom"),
+               "Seen from above, frame " + shown_frame(data),
                {box->low.x(), box->high.x(), false, "east [m]"},
                {box->low.y(), box->high.y(), false, "north [m]"},
                SvgPlot::kWidth * size_m.y() / size_m.x());

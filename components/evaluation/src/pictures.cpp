@@ -2,10 +2,7 @@
 // Copyright the Trigpoint developers
 #include "pictures.hpp"
 
-#include "trigpoint/export/map.hpp"
-
 #include <algorithm>
-#include <filesystem>
 
 namespace trigpoint::evaluation {
 
@@ -14,10 +11,8 @@ std::optional<Pose> lio_placement(const SessionData& data) {
   return align(associate(data.lio, target).pairs, AlignmentKind::kYawTranslation);
 }
 
-PointCloud map_under(const SessionData& data) {
-  const auto map = data.path(exporter::session_file::kMap);
-  const bool is_in_map = data.alignment.has_value() || data.fused.empty();
-  return is_in_map && std::filesystem::exists(map) ? exporter::read_pcd(map) : PointCloud{};
+const char* lio_title(bool is_placed) {
+  return is_placed ? "lio (yaw + translation)" : "lio (odom, not aligned)";
 }
 
 double seconds_since(Nanoseconds begin_ns, Nanoseconds stamp_ns) {

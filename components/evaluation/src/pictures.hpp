@@ -12,8 +12,11 @@
 
 namespace trigpoint::evaluation {
 
-/// Top view of all trajectories and fixes over the map's points, in metres east and north.
-std::string draw_trajectories(const SessionData& data, const std::string& gnuplot);
+/// Top view of all trajectories and fixes over the points of `map` (may be empty), in metres east
+/// and north.
+std::string draw_trajectories(const SessionData& data,
+                              const PointCloud& map,
+                              const std::string& gnuplot);
 
 /// Sigma of the GPS odometry per axis with threshold, the gate's choice as the background and the
 /// outages; height and, with truth, error over time below.
@@ -25,8 +28,8 @@ std::string draw_scan_times(const SessionData& data, const std::string& gnuplot)
 /// when there is nothing to bring it onto.
 std::optional<Pose> lio_placement(const SessionData& data);
 
-/// The map's points; none when there is no map that the trajectories could be drawn over.
-PointCloud map_under(const SessionData& data);
+/// What every legend calls lio.tum, laid onto map by lio_placement or not.
+const char* lio_title(bool is_placed);
 
 /// Seconds since the session's first stamp.
 double seconds_since(Nanoseconds begin_ns, Nanoseconds stamp_ns);

@@ -6,6 +6,7 @@
 #include "report_page.hpp"
 #include "report_sections.hpp"
 #include "session_data.hpp"
+#include "session_map.hpp"
 #include "session_scores.hpp"
 
 #include <algorithm>
@@ -20,9 +21,14 @@ namespace file = exporter::session_file;
 
 using Draw = std::function<std::string(const SessionData&, const std::string& gnuplot)>;
 
-void draw_all(const SessionData& data, const ReportOptions& options, ReportResult& result) {
-  for (const Draw& draw :
-       {Draw(draw_trajectories), Draw(draw_uncertainty), Draw(draw_scan_times)}) {
+void draw_all(const SessionData& data,
+              const PointCloud& map,
+              const ReportOptions& options,
+              ReportResult& result) {
+  const Draw trajectories = [&](const SessionData& session, const std::string& gnuplot) {
+    return draw_trajectories(session, map, gnuplot);
+  };
+  for (const Draw& draw : {trajectories, Draw(draw_uncertainty), Draw(draw_scan_times)}) {
     try {
       result.pictures.push_back(draw(data, options.gnuplot));
     } catch (const std::exception& error) {
@@ -51,10 +57,13 @@ std::string print_pictures(const std::vector<std::string>& pictures) {
                             "trajectories.gp` draws anew.\n";
 }
 
-void write_page(const SessionData& data, const PageContent& content, ReportResult& result) {
+void write_page(const SessionData& data,
+                const PointCloud& map,
+                const PageContent& content,
+                ReportResult& result) {
   const std::string path = data.path(kReportPage);
   try {
-    exporter::write_text(path, make_page(data, content));
+    exporter::write_text(path, make_page(data, map, content));
     result.page_file = path;
   } catch (const std::exception& error) {
     std::error_code ignored;
@@ -121,10 +130,15 @@ ReportResult write_report(const std::string& session_folder, const ReportOptions
   const auto data = load_session(session_folder, options);
   ReportResult result;
   result.problems = data.problems;
+  const SessionMap map = read_map(data);
+  if (!map.problem.empty()) {
+    result.problems.push_back(map.problem + ".");
+  }
+  const PointCloud& shown = map_under(data, map);
   const Accounting found = account(data);
   result.failures = find_failures(data, found);
   if (options.pictures) {
-    draw_all(data, options, result);
+    draw_all(data, shown, options, result);
   }
   const auto scores = score_session(data);
   std::vector<std::string> sections{print_run(data),
@@ -134,10 +148,10 @@ ReportResult write_report(const std::string& session_folder, const ReportOptions
                                     print_gate(data),
                                     print_times(data),
                                     print_accounting(data, found),
-                                    print_map(data)};
+                                    print_map(data, map)};
   std::erase(sections, "");
   if (options.page) {
-    write_page(data, {scores, sections, result.problems, result.failures}, result);
+    write_page(data, shown, {scores, sections, result.problems, result.failures}, result);
   }
   result.text = print_list("Failed", result.failures) + print_list("Problems", result.problems) +
                 joined(sections);

@@ -3,6 +3,7 @@
 #include "report_page.hpp"
 
 #include "html.hpp"
+#include "page_document.hpp"
 #include "page_files.hpp"
 #include "page_plots.hpp"
 #include "page_scene.hpp"
@@ -20,14 +21,6 @@ namespace {
 namespace file = exporter::session_file;
 
 constexpr const char* kTimesTitle = "Times per scan";  ///< of the section of report.md
-
-/// The page may load nothing, not even from its own folder.
-constexpr const char* kHead =
-    "<meta charset=\"utf-8\"/>\n"
-    "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src "
-    "'unsafe-inline'; script-src 'unsafe-inline'; img-src data:\"/>\n"
-    "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n"
-    "<meta name=\"color-scheme\" content=\"light dark\"/>\n";
 
 std::string name_of_session(const SessionData& data) {
   const auto path = std::filesystem::weakly_canonical(data.folder);
@@ -175,18 +168,8 @@ std::string subtitle(const SessionData& data) {
 
 }  // namespace
 
-std::string make_page(const SessionData& data, const PageContent& content) {
-  auto problems = content.problems;
-  PointCloud map;
-  try {
-    map = map_under(data);
-  } catch (const std::exception& error) {
-    const std::string problem = std::string(error.what()) + ".";
-    if (std::find(problems.begin(), problems.end(), problem) == problems.end()) {
-      problems.push_back(problem);
-    }
-  }
-  const std::string name = html::escape(name_of_session(data));
+std::string make_page(const SessionData& data, const PointCloud& map, const PageContent& content) {
+  const std::string name = name_of_session(data);
   std::string nav;
   std::string body;
   for (const auto& part : parts_of(data, content, map)) {
@@ -195,14 +178,14 @@ std::string make_page(const SessionData& data, const PageContent& content) {
     body +=
         "<section id=\"" + part.id + "\">\n<h2>" + title + "</h2>\n" + part.body + "</section>\n";
   }
-  return "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n" + std::string(kHead) + "<title>" + name +
-         " - Trigpoint session report</title>\n<style>\n" + page_files::kStyle +
-         "</style>\n</head>\n<body>\n<header><p class=\"kind\">Trigpoint session report</p><h1>" +
-         name + "</h1>\n<p>" + html::escape(subtitle(data)) + "</p>\n</header>\n<nav>" + nav +
-         "</nav>\n<main>\n" + note("failed", "Failed", content.failures) +
-         note("problem", "Problems", problems) + tiles(data, content) + body +
-         "</main>\n<script>\n" + page_files::kPlots + "</script>\n<script>\n" + page_files::kMap3d +
-         "</script>\n</body>\n</html>\n";
+  return html_of({name + " - Trigpoint session report",
+                  "<header><p class=\"kind\">Trigpoint session report</p><h1>" +
+                      html::escape(name) + "</h1>\n<p>" + html::escape(subtitle(data)) +
+                      "</p>\n</header>\n<nav>" + nav + "</nav>\n<main>\n" +
+                      note("failed", "Failed", content.failures) +
+                      note("problem", "Problems", content.problems) + tiles(data, content) + body +
+                      "</main>\n",
+                  {page_files::kPlots, page_files::kMap3d}});
 }
 
 }  // namespace trigpoint::evaluation

@@ -21,7 +21,7 @@ struct PageContent {
   std::vector<std::string> failures;
 };
 
-/// The page's text. A map that cannot be read is told on the page, among the problems.
-std::string make_page(const SessionData& data, const PageContent& content);
+/// The page's text; `map` (may be empty) lies under the trajectories and is shown in 3-D.
+std::string make_page(const SessionData& data, const PointCloud& map, const PageContent& content);
 
 }  // namespace trigpoint::evaluation

@@ -3,7 +3,6 @@
 #include "report_sections.hpp"
 
 #include "trigpoint/evaluation/plane_thickness.hpp"
-#include "trigpoint/export/map.hpp"
 
 #include "table.hpp"
 
@@ -97,11 +96,8 @@ std::string points_of(const std::string& pcd) {
   return "an unknown number of";
 }
 
-/// What the file says of its frame goes before what the session's other files lead to expect.
-std::string place_of_map(const SessionData& data, const std::string& pcd) {
-  const auto named = exporter::frame_of_pcd(pcd);
-  const std::string frame = !named.empty() ? named : data.alignment ? "map" : "odom";
-  if (frame == "odom") {
+std::string place_of_map(const SessionData& data, const SessionMap& map) {
+  if (map.frame == "odom") {
     return "Its frame is odom: nothing aligned it with map.";
   }
   if (!data.alignment) {
@@ -116,13 +112,11 @@ std::string place_of_map(const SessionData& data, const std::string& pcd) {
                "place nor its direction can be relied on.";
 }
 
-std::string thickness_text(const std::string& pcd) {
-  PlaneThickness found;
-  try {
-    found = facade_thickness(exporter::read_pcd(pcd));
-  } catch (const std::exception& error) {
-    return "Thickness of facades: " + std::string(error.what()) + ".\n";
+std::string thickness_text(const SessionMap& map) {
+  if (!map.problem.empty()) {
+    return "Thickness of facades: " + map.problem + ".\n";
   }
+  const PlaneThickness found = facade_thickness(map.points);
   if (found.planes == 0) {
     return "Thickness of facades: there is no upright plane to measure.\n";
   }
@@ -237,15 +231,15 @@ std::string print_times(const SessionData& data) {
   return text + table.str();
 }
 
-std::string print_map(const SessionData& data) {
+std::string print_map(const SessionData& data, const SessionMap& map) {
   std::string text = "## Map\n\n";
-  const auto map = data.path(file::kMap);
+  const auto pcd = data.path(file::kMap);
   std::error_code error;
-  const auto bytes = std::filesystem::file_size(map, error);
+  const auto bytes = std::filesystem::file_size(pcd, error);
   if (error) {
     return text + "There is no " + std::string(file::kMap) + ".\n";
   }
-  return text + "[" + file::kMap + "](" + file::kMap + "): " + points_of(map) + " points, " +
+  return text + "[" + file::kMap + "](" + file::kMap + "): " + points_of(pcd) + " points, " +
          fixed(static_cast<double>(bytes) * 1e-6, 1) + " MB. " + place_of_map(data, map) + "\n\n" +
          thickness_text(map);
 }

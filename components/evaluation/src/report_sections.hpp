@@ -4,6 +4,7 @@
 #pragma once
 
 #include "session_data.hpp"
+#include "session_map.hpp"
 
 #include <string>
 #include <vector>
@@ -14,7 +15,7 @@ std::string print_run(const SessionData& data);
 std::string print_alignment(const SessionData& data);
 std::string print_gate(const SessionData& data);
 std::string print_times(const SessionData& data);
-std::string print_map(const SessionData& data);
+std::string print_map(const SessionData& data, const SessionMap& map);
 
 /// Sentences about messages that went missing, and about those that were refused with a reason.
 struct Accounting {

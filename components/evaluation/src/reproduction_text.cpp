@@ -2,7 +2,7 @@
 // Copyright the Trigpoint developers
 #include "html.hpp"
 #include "json.hpp"
-#include "page_files.hpp"
+#include "page_document.hpp"
 #include "reproduction.hpp"
 #include "table.hpp"
 
@@ -253,11 +253,7 @@ std::string page_of(const Reproduction& result, const std::string& folder) {
               data_url(exporter::path_in(folder, picture)) + "\"/></figure>\n";
     }
   }
-  return "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n<meta "
-         "name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n<title>The paper's "
-         "comparison - Trigpoint</title>\n<style>\n" +
-         std::string(page_files::kStyle) + "</style>\n</head>\n<body>\n<main>\n" + body +
-         "</main>\n</body>\n</html>\n";
+  return html_of({"The paper's comparison - Trigpoint", "<main>\n" + body + "</main>\n", {}});
 }
 
 std::string json_of(const Evaluation& evaluation) {

@@ -162,12 +162,17 @@ std::string print_step(const SessionData& data) {
   }
   const auto step =
       data.lio.empty() ? largest_step(data.fused) : largest_step(data.fused, data.lio);
+  const std::size_t unjudged = data.fused.size() - 1 - step.intervals;
   return "Largest step of " + std::string(file::kFused) +
          (step.relative_to_lio ? " (its change minus that of lio.tum over the same interval): "
                                : " (plain change between consecutive poses): ") +
          fixed(step.distance_m, 3) + " m, " + fixed(step.rotation_deg, 2) + " deg at " +
          exporter::stamp_text(step.stamp_ns) + ", of " + std::to_string(step.intervals) +
-         " intervals.\n";
+         " intervals" +
+         (unjudged == 0 ? ""
+                        : "; " + std::to_string(unjudged) +
+                              " more are not judged, since lio.tum has no pose near them") +
+         ".\n";
 }
 
 }  // namespace

@@ -37,11 +37,20 @@ OGRSpatialReference wgs84() {
   return reference;
 }
 
+/// Not negative, also before 1970.
+Nanoseconds rest_of(Nanoseconds stamp_ns, Nanoseconds unit_ns) {
+  return ((stamp_ns % unit_ns) + unit_ns) % unit_ns;
+}
+
+/// To the millisecond, which is all that GDAL prints. Rounded here, since GDAL makes 59.9996 s the
+/// 60th second of the same minute, which no reader knows.
 void set_time(OGRFeature& feature, const char* field, Nanoseconds stamp_ns) {
   constexpr int kUtc = 100;
-  const Nanoseconds fraction_ns =
-      ((stamp_ns % kNanosecondsPerSecond) + kNanosecondsPerSecond) % kNanosecondsPerSecond;
-  const std::time_t second = (stamp_ns - fraction_ns) / kNanosecondsPerSecond;
+  constexpr Nanoseconds kMillisecond_ns = 1'000'000;
+  const Nanoseconds half_up_ns = stamp_ns + kMillisecond_ns / 2;
+  const Nanoseconds rounded_ns = half_up_ns - rest_of(half_up_ns, kMillisecond_ns);
+  const Nanoseconds fraction_ns = rest_of(rounded_ns, kNanosecondsPerSecond);
+  const std::time_t second = (rounded_ns - fraction_ns) / kNanosecondsPerSecond;
   std::tm utc{};
   gmtime_r(&second, &utc);
   feature.SetField(feature.GetFieldIndex(field),

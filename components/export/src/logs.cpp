@@ -52,6 +52,26 @@ double variance_of(double sigma) {
   return sigma * sigma;
 }
 
+std::string gate_line(const FusionStatus& status, const FixVerdict& verdict) {
+  CsvLine line;
+  line.add(status.stamp_ns).add(status.mode);
+  line.add(verdict.fix_stamp_ns).add(verdict.used).add(verdict.reason);
+  for (const auto& axis : status.axes) {
+    line.add(name_of(axis.source, kAxisSourceNames)).add(axis.sigma_m);
+    line.add(axis.threshold_m).add(axis.reason);
+  }
+  line.add(status.aligned).add(status.T_map_odom.yaw_rad);
+  line.add(status.T_map_odom.p.x()).add(status.T_map_odom.p.y()).add(status.T_map_odom.p.z());
+  line.add(status.T_map_odom.tilt_rad.x()).add(status.T_map_odom.tilt_rad.y());
+  line.add(status.yaw_sigma_rad);
+  for (const double sigma_m : status.position_sigma_m) {
+    line.add(sigma_m);
+  }
+  line.add(status.fixes_seen).add(status.fixes_used);
+  line.add(join_counts(status.verdicts)).add(status.gps_source);
+  return line.str();
+}
+
 }  // namespace
 
 FixLog::FixLog(const std::string& file, Opening opening)
@@ -99,23 +119,11 @@ GateLog::GateLog(const std::string& file, Opening opening)
 GateLog::~GateLog() = default;
 
 void GateLog::append(const FusionStatus& status) {
-  CsvLine line;
-  line.add(status.stamp_ns).add(status.mode);
-  line.add(status.verdict.fix_stamp_ns).add(status.verdict.used).add(status.verdict.reason);
-  for (const auto& axis : status.axes) {
-    line.add(name_of(axis.source, kAxisSourceNames)).add(axis.sigma_m);
-    line.add(axis.threshold_m).add(axis.reason);
+  // The last one judged is the newest one, whose row comes last.
+  for (std::size_t i = 0; i + 1 < status.judged.size(); ++i) {
+    lines_->append(gate_line(status, status.judged[i]));
   }
-  line.add(status.aligned).add(status.T_map_odom.yaw_rad);
-  line.add(status.T_map_odom.p.x()).add(status.T_map_odom.p.y()).add(status.T_map_odom.p.z());
-  line.add(status.T_map_odom.tilt_rad.x()).add(status.T_map_odom.tilt_rad.y());
-  line.add(status.yaw_sigma_rad);
-  for (const double sigma_m : status.position_sigma_m) {
-    line.add(sigma_m);
-  }
-  line.add(status.fixes_seen).add(status.fixes_used);
-  line.add(join_counts(status.verdicts)).add(status.gps_source);
-  lines_->append(line.str());
+  lines_->append(gate_line(status, status.verdict));
 }
 
 std::vector<FusionStatus> read_gate_log(const std::string& file) {

@@ -61,6 +61,20 @@ void require(const std::string& file) {
   }
 }
 
+/// Of a file whose head was read: PCL crashes on one that is none.
+PointCloud read_with_pcl(const std::string& file) {
+  pcl::PCLPointCloud2 raw;
+  if (pcl::PCDReader().read(file, raw) != 0) {
+    throw std::runtime_error(file + ": not a readable PCD file");
+  }
+  const PointLayout layout(file, [&](const char* name) { return offset_of(raw, name); });
+  PointCloud cloud;
+  for (std::size_t at = 0; at + raw.point_step <= raw.data.size(); at += raw.point_step) {
+    cloud.push_back(layout.point_at(raw.data.data() + at));
+  }
+  return cloud;
+}
+
 /// 1 MB of a map.
 constexpr std::size_t kPointsAtOnce = 65536;
 
@@ -84,16 +98,10 @@ std::string frame_of_pcd(const std::string& file) {
 }
 
 PointCloud read_pcd(const std::string& file) {
-  require(file);
-  pcl::PCLPointCloud2 raw;
-  if (pcl::PCDReader().read(file, raw) != 0) {
-    throw std::runtime_error(file + ": not a readable PCD file");
-  }
-  const PointLayout layout(file, [&](const char* name) { return offset_of(raw, name); });
   PointCloud cloud;
-  for (std::size_t at = 0; at + raw.point_step <= raw.data.size(); at += raw.point_step) {
-    cloud.push_back(layout.point_at(raw.data.data() + at));
-  }
+  visit_pcd(file, [&](const PointCloud& points, double) {
+    cloud.insert(cloud.end(), points.begin(), points.end());
+  });
   return cloud;
 }
 
@@ -102,7 +110,7 @@ void visit_pcd(const std::string& file,
   require(file);
   const PcdHead head = read_pcd_head(file);
   if (head.storage != "binary") {
-    PointCloud cloud = read_pcd(file);
+    PointCloud cloud = read_with_pcl(file);
     std::erase_if(cloud, [](const PointXyzi& point) { return !point.position().allFinite(); });
     visit(cloud, 1.0);
     return;

@@ -43,12 +43,20 @@ std::uint64_t number_in(const std::vector<std::string>& words, std::size_t i) {
   return static_cast<std::uint64_t>(value);
 }
 
+/// Of one number, byte: the format has no longer ones.
+constexpr std::uint64_t kLargestSize = 8;
+/// Numbers of one field: the longest of PCL's descriptors has some 2000.
+constexpr std::uint64_t kLargestCount = 65536;
+
 PcdHead head_of(const Lines& lines) {
   PcdHead head;
   const auto& names = lines.at("FIELDS");
   for (std::size_t i = 0; i < names.size(); ++i) {
     const std::uint64_t size = number_in(lines.at("SIZE"), i);
     const std::uint64_t count = lines.count("COUNT") == 0 ? 1 : number_in(lines.at("COUNT"), i);
+    if (size > kLargestSize || count > kLargestCount) {
+      throw std::invalid_argument("field");  // or the bytes of a point would overflow
+    }
     const bool is_float32 = size == 4 && count == 1 && lines.at("TYPE").at(i) == "F";
     head.fields.push_back({names[i], head.point_bytes, is_float32});
     head.point_bytes += size * count;

@@ -8,6 +8,7 @@
 #include <array>
 #include <cstdio>
 #include <filesystem>
+#include <iterator>
 
 namespace trigpoint::exporter {
 
@@ -26,8 +27,9 @@ constexpr std::array<Known, 5> kTrajectories{
      {session_file::kGps, "the GPS filter, base_link in map", true},
      {session_file::kTruth, "truth of the log, base_link in map", true}}};
 
-/// lio and fused have no stamps in common; within this they are taken for the same moment.
-constexpr Nanoseconds kSameMoment_ns = 20'000'000;
+/// lio and fused have no stamps in common: lio, a pose a scan, is interpolated, but for a lost
+/// scan.
+constexpr Nanoseconds kLongestGap_ns = 250'000'000;
 
 std::string fixed(double value, int decimals) {
   std::array<char, 64> text{};
@@ -35,20 +37,32 @@ std::string fixed(double value, int decimals) {
   return text.data();
 }
 
-std::optional<Pose> pose_near(const Trajectory& trajectory, Nanoseconds stamp_ns) {
+/// Interpolated; nullopt outside the trajectory and in its gaps.
+std::optional<Pose> pose_at(const Trajectory& trajectory, Nanoseconds stamp_ns) {
   const auto after = std::lower_bound(
       trajectory.begin(), trajectory.end(), stamp_ns, [](const StampedPose& pose, Nanoseconds t) {
-        return pose.stamp_ns < t - kSameMoment_ns;
+        return pose.stamp_ns < t;
       });
-  return after != trajectory.end() && after->stamp_ns <= stamp_ns + kSameMoment_ns
-             ? std::optional(after->pose)
-             : std::nullopt;
+  if (after == trajectory.end()) {
+    return std::nullopt;
+  }
+  if (after->stamp_ns == stamp_ns) {
+    return after->pose;
+  }
+  if (after == trajectory.begin() ||
+      after->stamp_ns - std::prev(after)->stamp_ns > kLongestGap_ns) {
+    return std::nullopt;
+  }
+  const auto before = std::prev(after);
+  const double part =
+      to_seconds(stamp_ns - before->stamp_ns) / to_seconds(after->stamp_ns - before->stamp_ns);
+  return interpolate(before->pose, after->pose, part);
 }
 
 /// T_map_odom at the first moment that both know.
 std::optional<Pose> first_placement(const Trajectory& fused, const Trajectory& lio) {
   for (const StampedPose& pose : fused) {
-    if (const auto odom = pose_near(lio, pose.stamp_ns)) {
+    if (const auto odom = pose_at(lio, pose.stamp_ns)) {
       return pose.pose * odom->inverse();
     }
   }

@@ -8,6 +8,7 @@
 #include "trigpoint/bus/topics.hpp"
 
 #include "known_topics.hpp"
+#include "wish_list.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -60,7 +61,9 @@ class LiveView {
             options.server,
             channels(),
             [this, &loop](std::size_t channel, bool wanted) {
-              loop.post([this, channel, wanted] { want(channel, wanted); });
+              if (wishes_.add(channel, wanted)) {
+                loop.post([this] { fulfil(); });
+              }
             },
             options.on_event),
         clock_(participant_,
@@ -89,6 +92,12 @@ class LiveView {
     return clock > 0 && clock_.matched() > 0 ? clock : wall_ns();
   }
 
+  void fulfil() {
+    for (const auto& [channel, wanted] : wishes_.take()) {
+      want(channel, wanted);
+    }
+  }
+
   void want(std::size_t channel, bool wanted) {
     if (!wanted) {
       subscriptions_.erase(channel);
@@ -107,6 +116,7 @@ class LiveView {
 
   const std::vector<recording::KnownTopic> topics_;
   std::atomic<Nanoseconds> clock_ns_{0};
+  WishList wishes_;
   bus::Participant participant_;
   LiveServer server_;
   bus::Subscription<rosgraph_msgs::msg::Clock> clock_;

@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 
 namespace trigpoint::evaluation {
@@ -67,6 +68,37 @@ TEST(Comparison, takes_a_session_as_the_reference_of_a_file_with_its_lever_arm_a
               whole.blocks[i].compared[0].evaluation.scores[0].error.position_m.rmse);
   }
   EXPECT_EQ(file.blocks[0].compared[0].evaluation.outages.size(), 1U);
+}
+
+TEST(Comparison, of_a_session_names_once_what_could_not_be_read) {
+  const TemporaryFolder folder;
+  test::make_session(folder.path("s"));
+  tests::write_file(folder.path("s/fused.tum"), "1.0 no pose\n");
+  const Comparison comparison = compare({folder.path("s"), "", "", ""});
+  EXPECT_THAT(names_of(comparison.blocks.at(0)), testing::Not(Contains("fused.tum")));
+  EXPECT_EQ(std::count_if(comparison.remarks.begin(),
+                          comparison.remarks.end(),
+                          [](const auto& r) { return r.find("fused.tum:1") != std::string::npos; }),
+            1);
+  EXPECT_THAT(print(comparison), HasSubstr("fused.tum:1"));
+}
+
+TEST(Comparison, takes_the_same_gap_for_fixes_as_for_poses) {
+  const TemporaryFolder folder;
+  test::make_session(folder.path("s"));
+  const Trajectory fused = exporter::read_trajectory(folder.path("s") + "/fused.tum");
+  {
+    exporter::TrajectoryWriter sparse(folder.path("sparse.tum"), "base_link in map");
+    for (std::size_t i = 5; i < fused.size(); i += 10) {  // 0.5 s from each fix
+      sparse.append(fused[i].stamp_ns, fused[i].pose);
+    }
+  }
+  ComparisonInput input{folder.path("sparse.tum"), folder.path("s"), "", ""};
+  EXPECT_EQ(compare(input).blocks.size(), 1U) << "no fix has a pose nearer than 0.1 s";
+  input.largest_gap_ns = 500'000'000;
+  const Comparison wide = compare(input);
+  ASSERT_EQ(wide.blocks.size(), 3U);
+  EXPECT_GT(wide.blocks[2].compared[0].evaluation.pairs, 80U);
 }
 
 TEST(Comparison, of_a_session_without_truth_says_so) {
@@ -140,6 +172,11 @@ TEST(Comparison, is_drawn_for_each_reference) {
   test::make_session(folder.path("s"));
   const auto pictures = draw(compare({folder.path("s"), "", "", ""}), folder.path("pictures"));
   EXPECT_EQ(pictures.size(), 9U);
+  tests::write_file(folder.path("bob's.tum"), tests::read_file(folder.path("s/fused.tum")));
+  EXPECT_EQ(draw(compare({folder.path("bob's.tum"), folder.path("bob's.tum"), "", ""}),
+                 folder.path("quoted"))
+                .size(),
+            3U);
   for (const std::string& picture : pictures) {
     EXPECT_GT(std::filesystem::file_size(picture), 5000U) << picture;
   }

@@ -14,7 +14,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <regex>
 #include <set>
@@ -171,6 +173,33 @@ TEST(ReportPage, has_every_part_of_a_whole_session) {
     EXPECT_THAT(page, HasSubstr("id=\"" + id + "\""));
   }
   EXPECT_THAT(page, HasSubstr("dropout 1: 20.0 s"));
+}
+
+TEST(ReportPage, lays_no_map_under_trajectories_of_another_frame) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  const std::string pcd = read_all(folder.file("map.pcd"));
+  const auto has_map = [&](const std::string& said) {
+    write_all(folder.file("map.pcd"), said + pcd);
+    const std::string page = page_of(folder.path());
+    const bool is_under = page.find("<image") != std::string::npos;
+    EXPECT_EQ(page.find("\"count\": 0,") == std::string::npos, is_under) << "in 3-D otherwise";
+    return is_under;
+  };
+  EXPECT_FALSE(has_map("# frame odom\n"));
+  EXPECT_TRUE(has_map("# frame map\n"));
+  std::filesystem::remove(folder.file("alignment.yaml"));
+  EXPECT_TRUE(has_map("# frame map\n")) << "the mapper has its own alignment";
+  EXPECT_FALSE(has_map("")) << "nobody says that it is in map";
+}
+
+TEST(ReportPage, of_a_map_that_cannot_be_read_tells_so_once_and_shows_the_rest) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  write_all(folder.file("map.pcd"), "nonsense");
+  const auto result = write_report(folder.path(), only_page());
+  EXPECT_THAT(result.problems, ElementsAre(HasSubstr("map.pcd: not a readable PCD file.")));
+  EXPECT_THAT(read_all(result.page_file), HasSubstr("id=\"top-view\""));
 }
 
 TEST(ReportPage, has_restarts_as_a_part_of_their_own) {

@@ -99,6 +99,25 @@ TEST(Report, tells_gps_good_and_the_outage_apart) {
   EXPECT_EQ(outage[5], three_digits(test::kOutageEndError_m * 199.0 / 200.0));
 }
 
+TEST(Report, tells_how_many_steps_it_could_not_judge) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  EXPECT_THAT(write_report(folder.path(), kNoPictures).text, HasSubstr("of 1100 intervals."));
+  const auto lio = exporter::read_trajectory(folder.file("lio.tum"));
+  std::filesystem::remove(folder.file("lio.tum"));
+  {
+    exporter::TrajectoryWriter writer(folder.file("lio.tum"), "base_link in odom");
+    for (std::size_t i = 0; i < lio.size(); ++i) {
+      if (i < 500 || i >= 510) {  // a second without scans
+        writer.append(lio[i].stamp_ns, lio[i].pose);
+      }
+    }
+  }
+  EXPECT_THAT(
+      write_report(folder.path(), kNoPictures).text,
+      HasSubstr("of 1089 intervals; 11 more are not judged, since lio.tum has no pose near them."));
+}
+
 TEST(Report, scores_lio_aligned_since_it_lives_in_odom) {
   const ScratchFolder folder;
   make_session(folder.path());

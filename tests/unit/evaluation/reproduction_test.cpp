@@ -193,6 +193,22 @@ TEST(Reproduction, writes_files_that_say_that_they_are_incomplete) {
   EXPECT_TRUE(nlohmann::json::parse(tests::read_file(out.file("reproduction.json")))["complete"]);
 }
 
+TEST(Reproduction, has_a_page_that_loads_nothing_and_takes_names_for_text) {
+  MadeDrive made;
+  const ScratchFolder out;
+  made.drive.name = "<img src=x onerror=alert(1)>";
+  DriveFigures figures = score(made.drive);
+  tests::write_file(out.file("a.png"), "picture");
+  figures.pictures = {"a.png"};
+  write({"<script>alert(2)</script>", {figures}, {}}, out.path());
+  const std::string page = tests::read_file(out.file("reproduction.html"));
+  EXPECT_THAT(page, HasSubstr("Content-Security-Policy\" content=\"default-src 'none'"));
+  EXPECT_THAT(page, HasSubstr("src=\"data:image/png;base64,cGljdHVyZQ==\""));
+  for (const char* loaded : {"http:", "https:", "<link", "<script", "<img src=x"}) {
+    EXPECT_THAT(page, Not(HasSubstr(loaded)));
+  }
+}
+
 TEST(Reproduction, has_the_same_figures_in_json_and_csv) {
   const MadeDrive made;
   const Reproduction result{"how", {score(made.drive)}, {}};
@@ -242,6 +258,19 @@ TEST(Reproduction, draws_both_pictures_and_says_when_it_cannot) {
   DriveFigures again = score(made.drive);
   draw(again, out.path(), "no_such_gnuplot");
   EXPECT_THAT(again.problems, ElementsAre(HasSubstr("gnuplot-nox")));
+}
+
+TEST(Reproduction, draws_a_drive_with_a_quote_in_its_name_and_without_a_word_of_the_gate) {
+  MadeDrive made;
+  const ScratchFolder out;
+  made.drive.name = "bob's lane";
+  for (const char* mode : {"lio", "literal"}) {
+    std::filesystem::remove(made.folder.file(mode) + "/gate.csv");
+  }
+  DriveFigures figures = score(made.drive);
+  draw(figures, out.path());
+  EXPECT_THAT(figures.problems, IsEmpty());
+  EXPECT_EQ(figures.pictures.size(), 2U);
 }
 
 }  // namespace

@@ -6,12 +6,11 @@
 #include "trigpoint/lio_mapper/keyframe_store.hpp"
 
 #include "scratch_folder.hpp"
+#include "small_disk.hpp"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include <cmath>
-#include <csignal>
 
 namespace trigpoint::exporter {
 namespace {
@@ -23,6 +22,7 @@ using test::write_all;
 using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
+using tests::SmallDisk;
 
 constexpr float kFloat_m = 1e-4F;
 
@@ -214,27 +214,19 @@ TEST_F(ExportSession, keeps_a_map_on_the_antimeridian_in_one_piece) {
   EXPECT_THAT(kml, AllOf(HasSubstr("<east>180.0001"), HasSubstr("<west>179.9998")));
 }
 
-/// While it lives no file of this process grows beyond `bytes`: as on a disk that fills up.
-class SmallDisk {
- public:
-  explicit SmallDisk(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    ::getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit limit{bytes, before_.rlim_max};
-    ::setrlimit(RLIMIT_FSIZE, &limit);
+TEST_F(ExportSession, writes_no_sixtieth_second) {
+  {
+    TrajectoryWriter fused(path_in(session(), session_file::kFused), "base_link in map");
+    fused.append(1'700'000'039'999'600'000, Pose{});  // 22:13:59.9996
+    fused.append(1'700'000'045'123'400'000, Pose{});
   }
-
-  ~SmallDisk() {
-    ::setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-
-  SmallDisk(const SmallDisk&) = delete;
-  SmallDisk& operator=(const SmallDisk&) = delete;
-
- private:
-  rlimit before_{};
-  void (*handler_)(int);
-};
+  write_datum(path_in(session(), session_file::kDatum), {43.9, -78.9, 100.0});
+  export_session(session(), out(), {{"gpx", "geojson"}});
+  EXPECT_THAT(read_all(out("trajectories.gpx")),
+              AllOf(HasSubstr("<time>2023-11-14T22:14:00Z</time>"),
+                    HasSubstr("<time>2023-11-14T22:14:05.123Z</time>")));
+  EXPECT_THAT(read_all(out("trajectories.geojson")), HasSubstr("2023-11-14T22:14:00Z"));
+}
 
 TEST_F(ExportSession, names_the_file_that_the_disk_had_no_room_for_and_leaves_no_part_of_it) {
   PointCloud cloud;
@@ -281,6 +273,23 @@ TEST_F(ExportSession, places_lio_once_so_that_its_drift_shows) {
   EXPECT_THAT(lio_line, HasSubstr("placed once"));
   EXPECT_THAT(lio_line, HasSubstr("[ 3.000089832, 0.000001"));  // 10 m
   EXPECT_THAT(lio_line, HasSubstr("[ 3.000125764, 0.000001"));  // 14 m
+}
+
+TEST_F(ExportSession, places_lio_at_the_very_moment_of_the_first_published_pose) {
+  // Both drive east at 10 m/s; fused begins between two scans, 20 ms before the second.
+  TrajectoryWriter fused(path_in(session(), session_file::kFused), "base_link in map");
+  TrajectoryWriter lio(path_in(session(), session_file::kLio), "base_link in odom");
+  const auto at = [](double x_m) { return Pose(Eigen::Quaterniond::Identity(), {x_m, 0.0, 0.0}); };
+  lio.append(1'000'000'000, at(0.0));
+  lio.append(1'100'000'000, at(1.0));
+  fused.append(1'080'000'000, at(100.8));
+  fused.append(1'100'000'000, at(101.0));
+  write_datum(path_in(session(), session_file::kDatum), {1e-6, 3.0, 0.0});
+  export_session(session(), out(), {{"geojson"}});
+  const std::string text = read_all(out("trajectories.geojson"));
+  // 100 m and 101 m at 8.98315e-6 degrees each.
+  EXPECT_THAT(text.substr(text.find("\"lio\"")),
+              AllOf(HasSubstr("[ 3.000898315"), HasSubstr("[ 3.000907298")));
 }
 
 }  // namespace

@@ -296,7 +296,9 @@ TEST_P(Landmark, and_the_other_point_are_the_opaque_cells_of_the_overlay) {
   for (const Eigen::Vector3d& p_map_m : {kLandmark_map_m, kOther_map_m}) {
     const Eigen::Vector3d place =
         transformed(kGeocentric, kGeographic3d, geocentric_of(GetParam().datum, p_map_m));
-    const double across = (place.x() - border("west")) / (border("east") - border("west"));
+    // A box over the antimeridian goes on beyond 180 degrees.
+    const double from_west_deg = std::remainder(place.x() - border("west"), 360.0);
+    const double across = from_west_deg / (border("east") - border("west"));
     const double down = (border("north") - place.y()) / (border("north") - border("south"));
     ASSERT_TRUE(across >= 0.0 && across < 1.0 && down >= 0.0 && down < 1.0);
     const auto cell = static_cast<std::size_t>(down * rows) * static_cast<std::size_t>(columns) +
@@ -312,7 +314,10 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(Place{"north", {43.9456, -78.8968, 100.0}, 32617},
                     Place{"south", {-33.8568, 151.2153, 20.0}, 32756},
                     Place{"south_of_the_equator_from_north_of_it", {0.003, 8.999, 5.0}, 32632},
-                    Place{"over_the_edge_of_the_zone", {48.1, 5.995, 300.0}, 32631}),
+                    Place{"over_the_edge_of_the_zone", {48.1, 5.995, 300.0}, 32631},
+                    Place{"over_the_antimeridian", {-17.0, 179.99, 5.0}, 32760},
+                    Place{"in_norway_s_wide_zone", {60.4, 5.3, 50.0}, 32632},
+                    Place{"on_svalbard", {78.2, 15.6, 50.0}, 32633}),
     [](const auto& place) { return std::string(place.param.name); });
 
 }  // namespace

@@ -92,9 +92,13 @@ TEST(Pcd, that_is_none_is_named) {
   const ScratchFolder folder;
   write_all(folder.file("text.pcd"), "this is no cloud\n");
   write_all(folder.file("cut.pcd"), "VERSION 0.7\nFIELDS x y z\nSIZE 4 4\n");
-  for (const char* name : {"text.pcd", "cut.pcd"}) {
+  write_all(folder.file("vast.pcd"),
+            "FIELDS x y z w\nSIZE 4 4 4 8\nTYPE F F F F\nCOUNT 1 1 1 2305843009213693952\n"
+            "POINTS 9\nDATA binary\n");
+  for (const char* name : {"text.pcd", "cut.pcd", "vast.pcd"}) {
     EXPECT_THAT(error_of([&] { visit_pcd(folder.file(name), [](const auto&, double) {}); }),
                 testing::AllOf(HasSubstr(name), HasSubstr("not a readable PCD")));
+    EXPECT_THAT(error_of([&] { read_pcd(folder.file(name)); }), HasSubstr("not a readable PCD"));
   }
 }
 

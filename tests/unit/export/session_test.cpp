@@ -17,6 +17,7 @@ using test::read_all;
 using test::ScratchFolder;
 using test::write_all;
 using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 /// One rounding when a sigma becomes a variance again.
@@ -114,6 +115,29 @@ TEST(GateLog, returns_reasons_with_commas_quotes_and_line_breaks_in_one_row) {
   EXPECT_EQ(row.verdicts[0].name, "stale: 2 s");
   EXPECT_EQ(row.verdicts[0].count, 2U);
   EXPECT_EQ(row.gps_source, "ekf15");
+}
+
+TEST(GateLog, keeps_every_verdict_of_a_status_the_newest_last) {
+  const ScratchFolder folder;
+  FusionStatus status;
+  status.stamp_ns = 9;
+  status.fixes_seen = 4;
+  status.judged = {{5, true, "alignment"}, {7, false, "late"}, {6, true, "used"}};
+  status.verdict = status.judged.back();
+  GateLog log(folder.file("gate.csv"));
+  log.append(status);
+  status.judged.clear();  // nothing new
+  log.append(status);
+  const auto rows = read_gate_log(folder.file("gate.csv"));
+  std::vector<Nanoseconds> fixes_ns;
+  for (const FusionStatus& row : rows) {
+    fixes_ns.push_back(row.verdict.fix_stamp_ns);
+    EXPECT_EQ(row.stamp_ns, 9);
+    EXPECT_EQ(row.fixes_seen, 4U);
+  }
+  EXPECT_THAT(fixes_ns, ElementsAre(5, 7, 6, 6));
+  EXPECT_EQ(rows.at(1).verdict.reason, "late");
+  EXPECT_FALSE(rows.at(1).verdict.used);
 }
 
 TEST(ScanLog, returns_what_was_logged) {

@@ -3,12 +3,11 @@
 #include "trigpoint/export/session.hpp"
 
 #include "scratch_folder.hpp"
+#include "small_disk.hpp"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include <cmath>
-#include <csignal>
 #include <limits>
 
 namespace trigpoint::exporter {
@@ -100,31 +99,12 @@ TEST(Trajectory, says_that_the_disk_is_full) {
               testing::AllOf(HasSubstr("/dev/full"), HasSubstr("No space left on device")));
 }
 
-/// Files end at `bytes` until the end of the scope, as on a full disk.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) {
-    ::signal(SIGXFSZ, SIG_IGN);
-    ::getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit limit{bytes, before_.rlim_max};
-    ::setrlimit(RLIMIT_FSIZE, &limit);
-  }
-
-  ~FileSizeLimit() { ::setrlimit(RLIMIT_FSIZE, &before_); }
-
-  FileSizeLimit(const FileSizeLimit&) = delete;
-  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
-
- private:
-  rlimit before_{};
-};
-
 TEST(Trajectory, takes_back_a_line_that_did_not_fit_and_goes_on_when_there_is_room) {
   const ScratchFolder folder;
   TrajectoryWriter writer(folder.file("t.tum"), "base_link in map");
   Nanoseconds written = 0;
   {
-    const FileSizeLimit limit(500);
+    const tests::SmallDisk disk(500);
     const auto error = error_of([&] {
       while (writer.append(written + 1, Pose{})) {
         ++written;

@@ -259,6 +259,7 @@ TEST_F(Server, has_a_page_that_needs_no_other_file) {
   make();
   const std::string page = test::http(server->port(), "GET / HTTP/1.1\r\nHost: localhost\r\n\r\n");
   EXPECT_THAT(page, StartsWith("HTTP/1.1 200 OK"));
+  EXPECT_THAT(page, HasSubstr("\r\nContent-Security-Policy: default-src 'none'"));
   EXPECT_THAT(page, HasSubstr("class CdrReader"));
   for (const char* outside :
        {"<script src", "https://", "url(", "<link rel=\"stylesheet\"", "import("}) {

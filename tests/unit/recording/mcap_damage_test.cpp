@@ -266,6 +266,15 @@ TEST(McapDamage, lengths_beyond_reason_are_refused_before_anything_is_allocated)
   }
 }
 
+/// MCAP's CRC is that of zlib (CRC-32/ISO-HDLC), of which this is the published check value.
+TEST(McapCrc, has_the_check_value_of_its_kind_in_one_piece_and_in_two) {
+  const std::string digits = "123456789";
+  const std::vector<std::uint8_t> bytes(digits.begin(), digits.end());
+  constexpr std::uint32_t kCheck = 0xcbf43926;
+  EXPECT_EQ(mcap::crc32_of(bytes), kCheck);
+  EXPECT_EQ(mcap::crc32_of(Bytes(bytes).subspan(4), mcap::crc32_of(Bytes(bytes).first(4))), kCheck);
+}
+
 TEST(McapDamage, lz4_and_zstd_that_end_elsewhere_than_their_chunk_says_are_refused) {
   const std::vector<std::uint8_t> content(1000, 42);
   std::vector<std::uint8_t> lz4(LZ4F_compressFrameBound(content.size(), nullptr));

@@ -5,11 +5,11 @@
 #include "mcap_drive.hpp"
 #include "mcap_file.hpp"
 #include "mcap_format.hpp"
+#include "small_disk.hpp"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <lz4frame.h>
 #include <signal.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 #include <yaml-cpp/yaml.h>
@@ -206,15 +206,10 @@ TEST(Mcap, a_full_disk_is_told_and_keeps_what_was_written_with_its_summary) {
 TEST(Mcap, on_a_disk_that_takes_no_more_what_was_written_before_is_readable_and_counted) {
   TemporaryFolder folder;
   const auto path = (folder / "log").string();
-  const auto told_file = folder / "told";
-  const pid_t child = fork();
-  ASSERT_GE(child, 0);
-  if (child == 0) {
-    signal(SIGXFSZ, SIG_IGN);
-    const rlimit limit{9U << 20U, 9U << 20U};
-    setrlimit(RLIMIT_FSIZE, &limit);
-    std::string told;
-    try {
+  std::string told;
+  {
+    const tests::SmallDisk disk(9U << 20U);
+    told = message_of<LogError>([&] {
       Rosbag2Writer writer(path, Storage::kMcap);
       std::uint32_t noise = 1;
       for (int i = 0; i < 1000; ++i) {
@@ -225,19 +220,14 @@ TEST(Mcap, on_a_disk_that_takes_no_more_what_was_written_before_is_readable_and_
         }
         writer.write("points", kStart_ns + i * kMillisecond_ns, cloud);
       }
-    } catch (const LogError& error) {
-      told = error.what();
-    }
-    std::ofstream(told_file) << told;
-    _exit(0);
+    });
   }
-  waitpid(child, nullptr, 0);
   LogOptions points_alone;
   points_alone.require_imu = false;
   points_alone.require_fix = false;
   const auto kept = read_all(*open_log(path, RobotConfig{}, points_alone)).size();
   EXPECT_GT(kept, 50U);
-  EXPECT_THAT(bytes_of(told_file), HasSubstr("with " + std::to_string(kept) + " messages"));
+  EXPECT_THAT(told, HasSubstr("with " + std::to_string(kept) + " messages"));
 }
 
 TEST(Mcap, never_writes_over_another_recording) {

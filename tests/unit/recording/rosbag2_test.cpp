@@ -4,12 +4,12 @@
 #include "trigpoint/recording/rosbag2_writer.hpp"
 
 #include "samples.hpp"
+#include "small_disk.hpp"
 #include "temporary_folder.hpp"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sqlite3.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <yaml-cpp/yaml.h>
 
@@ -359,35 +359,23 @@ TEST(Rosbag2, empties_its_write_ahead_log_while_it_writes) {
 TEST(Rosbag2, on_a_disk_that_takes_no_more_what_was_written_before_is_readable_and_counted) {
   TemporaryFolder folder;
   const auto path = (folder / "log").string();
-  const auto count_file = folder / "count";
-  const pid_t child = fork();
-  ASSERT_GE(child, 0);
-  if (child == 0) {
-    signal(SIGXFSZ, SIG_IGN);
-    const rlimit limit{20U << 20U, 20U << 20U};
-    setrlimit(RLIMIT_FSIZE, &limit);
-    std::string told;
-    try {
+  std::string told;
+  {
+    const tests::SmallDisk disk(20U << 20U);
+    told = message_of<LogError>([&] {
       Rosbag2Writer writer(path);
       for (int i = 0; i < 1000; ++i) {
         writer.write("points", kStart_ns + i * kMillisecond_ns, sample_cloud(i % 50, 5000));
       }
-    } catch (const LogError& error) {
-      told = error.what();
-    }
-    std::ofstream(count_file) << told;
-    _exit(0);
+    });
   }
-  waitpid(child, nullptr, 0);
-  std::stringstream told;
-  told << std::ifstream(count_file).rdbuf();
   LogOptions points_alone;
   points_alone.require_imu = false;
   points_alone.require_fix = false;
   const auto log = open_log(path, RobotConfig{}, points_alone);
   const auto kept = read_all(*log).size();
   EXPECT_GT(kept, 100U);
-  EXPECT_THAT(told.str(), HasSubstr("with " + std::to_string(kept) + " messages"));
+  EXPECT_THAT(told, HasSubstr("with " + std::to_string(kept) + " messages"));
 }
 
 TEST(Rosbag2, never_writes_over_another_recording) {

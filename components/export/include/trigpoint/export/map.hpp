@@ -71,7 +71,7 @@ std::string frame_of_pcd(const std::string& file);
 void visit_pcd(const std::string& file,
                const std::function<void(const PointCloud& points, double share)>& visit);
 
-/// Reads x y z and, when there, intensity.
+/// Reads x y z and, when there, intensity, of what visit_pcd hands over.
 PointCloud read_pcd(const std::string& file);
 
 }  // namespace trigpoint::exporter

@@ -111,7 +111,7 @@ struct LoggedFix {
 
 std::vector<LoggedFix> read_fixes(const std::string& file);
 
-/// gate.csv: one row per FusionStatus.
+/// gate.csv: a row per FusionStatus, and before it one for each further verdict that it tells.
 class GateLog {
  public:
   explicit GateLog(const std::string& file, Opening opening = Opening::kFresh);
