@@ -158,7 +158,8 @@ int run(MapOptions& options) {
             << result.data_s << " s of data in " << result.wall_s << " s ("
             << result.data_s / std::max(result.wall_s, 1e-9) << " x real time)\n";
   if (!refused_imu.empty()) {
-    std::cerr << "trigpoint map: " << refused_imu << ". What came before is of no use either\n";
+    std::cerr << "trigpoint map: " << refused_imu << (refused_imu.ends_with('.') ? " " : ". ")
+              << "What came before is of no use either\n";
     return 1;
   }
   if (not_resumed) {

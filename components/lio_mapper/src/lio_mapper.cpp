@@ -12,6 +12,7 @@
 #include "mapper_impl.hpp"
 
 #include <cmath>
+#include <cstdlib>
 #include <deque>
 #include <utility>
 
@@ -90,10 +91,11 @@ void LioMapper::Impl::queue(Sweep sweep, Output& output) {
   newest_sweep_ns = sweep.end_ns;
   sweeps.push_back(std::move(sweep));
   if (sweeps.size() > kMaxWaitingSweeps) {
-    const std::string newest =
-        imu.empty() ? "none has come"
-                    : "the newest is " + seconds_text(sweeps.front().end_ns - imu.newest_ns()) +
-                          " older than the sweep's end";
+    const Nanoseconds missing_ns = imu.empty() ? 0 : sweeps.front().end_ns - imu.newest_ns();
+    const std::string newest = imu.empty() ? "none has come"
+                                           : "the newest is " + seconds_text(std::abs(missing_ns)) +
+                                                 (missing_ns >= 0 ? " older" : " newer") +
+                                                 " than the sweep's end";
     refuse_front("imu_missing",
                  "refused a sweep that waited too long for IMU samples: " + newest +
                      "; do both clocks agree?",
@@ -150,8 +152,10 @@ void LioMapper::Impl::begin(Output& output) {
       {Severity::kInfo,
        result.initial.stamp_ns,
        "lio_started",
-       std::string("odom begins ") + (result.at_rest ? "at rest" : "in motion") + ", speed " +
-           std::to_string(result.speed_mps) + " m/s, roll and pitch " +
+       "odom begins " +
+           (result.at_rest ? "at rest"
+                           : "in motion at " + std::to_string(result.speed_mps) + " m/s") +
+           ", roll and pitch " +
            std::to_string(roll_pitch_yaw_of(result.initial.state.T_odom_base.q).x()) + " and " +
            std::to_string(roll_pitch_yaw_of(result.initial.state.T_odom_base.q).y()) + " rad"});
 }
@@ -223,9 +227,11 @@ void LioMapper::Impl::judge_health(const ScanOutcome& outcome,
       {good ? Severity::kInfo : Severity::kWarning,
        stamp_ns,
        good ? "lio_ok" : (status.health == LioHealth::kLost ? "lio_lost" : "lio_degraded"),
-       std::to_string(outcome.matches) + " of " + std::to_string(outcome.points) +
-           " points matched (at least " + std::to_string(config.matching.min_matches) +
-           " needed), " + seconds_text(stamp_ns - last_used_ns) + " since the last usable scan" +
+       (outcome.first ? "the map begins with " + std::to_string(outcome.points) + " points"
+                      : std::to_string(outcome.matches) + " of " + std::to_string(outcome.points) +
+                            " points matched") +
+           " (at least " + std::to_string(config.matching.min_matches) + " needed), " +
+           seconds_text(stamp_ns - last_used_ns) + " since the last usable scan" +
            (good ? "" : "; going on with the IMU alone where the scan does not help")});
 }
 
