@@ -34,7 +34,8 @@ struct Information {
   /// times those.
   double weight_per_m2{0.0};
   double weighted_thickness2{0.0};
-  std::size_t count{0};  ///< residuals in it
+  std::size_t count{0};           ///< residuals in it
+  double weighted_variance{0.0};  ///< sum of their variances times their weights
 };
 
 using PoseInformation = Information<error::kPose>;

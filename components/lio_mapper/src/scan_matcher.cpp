@@ -25,9 +25,6 @@ constexpr double kLeastRange_m = 1e-3;
 constexpr double kOpenPosition_m = 0.01;
 constexpr double kOpenRotation_rad = 2e-3;
 constexpr double kLeastInformation = 1e-3;  // of directions that no residual sees
-/// Of the stated variance of residuals that are known to scatter less: what a scan shares with the
-/// map scatters in neither.
-constexpr double kLeastScatter = 0.1;
 /// By so much a scan is displaced to see whether it is pulled back: within this other points become
 /// the nearest, and surfaces are still found.
 constexpr double kDisplaced_m = 0.25;
@@ -46,6 +43,14 @@ constexpr std::size_t kBlock = 256;
 void add_noise(const Vector3d& normal, double weighted_tilt2, Eigen::Matrix3d& noise) {
   noise -= weighted_tilt2 * normal * normal.transpose();
   noise.diagonal().array() += weighted_tilt2;
+}
+
+/// Of the residuals' variance that which is the map's: points on one plane share it, so that it
+/// does not scatter between them.
+template <int Size>
+double share_of_map(const Information<Size>& sum) {
+  return (kLeastVariance_m2 * sum.weight_per_m2 + sum.weighted_thickness2) /
+         (sum.weighted_variance + 1e-12);
 }
 
 /// The plane's normal stands in the columns of the position. All of the matrix is summed: half of
@@ -94,7 +99,7 @@ typename Information<Size>::Matrix noise_free_share(const Information<Size>& sum
 /// is A^-1 B A^-1 [H. White, "A heteroskedasticity-consistent covariance matrix estimator", 1980],
 /// and the eigenvalues of L^-1 B L^-T are how many times the stated variance that is, direction by
 /// direction. Each such direction keeps its estimate and loses that share of its information, or
-/// gains it where they scatter less, down to `least` of the stated variance.
+/// gains it where they scatter less, down to the share `least` of the stated variance.
 template <int Size>
 void allow_for_scatter(const typename Information<Size>::Matrix& scatter,
                        const Eigen::LLT<typename Information<Size>::Matrix>& root,
@@ -223,12 +228,13 @@ double ScanMatcher::variance_m2(const Residual& r, double cos_incidence) const {
          r.plane.thickness2_m2;
 }
 
-double ScanMatcher::weight_of(const Residual& r, double cos_incidence) const {
-  const double variance = variance_m2(r, cos_incidence);
+void ScanMatcher::weigh(Residual& r, double cos_incidence) const {
+  r.variance_m2 = variance_m2(r, cos_incidence);
+  const double variance = r.variance_m2;
   const double ratio = std::abs(r.residual_m) / (config_.robust_width * std::sqrt(variance));
   const double cos2 = cos_incidence * cos_incidence;
   const double surface = cos2 / (cos2 + config_.grazing_cos * config_.grazing_cos + 1e-12);
-  return surface * (ratio > 1.0 ? 1.0 / ratio : 1.0) / variance;
+  r.weight = surface * (ratio > 1.0 ? 1.0 / ratio : 1.0) / variance;
 }
 
 template <>
@@ -236,7 +242,7 @@ Vector6d ScanMatcher::row_of<error::kPose>(Residual& r, const Viewpoint& view) c
   const Vector3d normal_base = view.R_odom_base.transpose() * r.plane.normal;
   r.residual_m =
       normal_base.dot(r.point_base_m) + r.plane.normal.dot(view.T_odom_base.p) + r.plane.offset_m;
-  r.weight = weight_of(r, normal_base.dot(r.direction_base));
+  weigh(r, normal_base.dot(r.direction_base));
   // d(n . R exp(e) p) / de = (p x R^T n)^T
   Vector6d h;
   h << r.plane.normal, r.point_base_m.cross(normal_base);
@@ -273,7 +279,7 @@ PoseAndExtrinsicInformation::Vector ScanMatcher::row_of<error::kPoseAndExtrinsic
   }
   const Vector3d normal_base = view.R_odom_base.transpose() * normal;
   r.residual_m = normal.dot(point_odom_m - foot_odom_m);
-  r.weight = weight_of(r, normal_base.dot(r.direction_base));
+  weigh(r, normal_base.dot(r.direction_base));
   h.segment<3>(error::kPosition) = normal;
   h.segment<3>(error::kRotation) = point_base_m.cross(normal_base);
   return h;
@@ -324,6 +330,7 @@ Information<Size> ScanMatcher::sum_of_all(const Viewpoint& view,
       Residual& r = residuals_[i];
       scratch.rows[i] = row_of<Size>(r, view);
       add_row(scratch.rows[i], r.weight, r.residual_m, r.plane, scratch.sums[block]);
+      scratch.sums[block].weighted_variance += r.weight * r.variance_m2;
     }
   });
   Information<Size> sum;
@@ -333,6 +340,7 @@ Information<Size> ScanMatcher::sum_of_all(const Viewpoint& view,
     sum.noise += part.noise;
     sum.weight_per_m2 += part.weight_per_m2;
     sum.weighted_thickness2 += part.weighted_thickness2;
+    sum.weighted_variance += part.weighted_variance;
     sum.count += part.count;
   }
   return sum;
@@ -380,7 +388,7 @@ Information<Size> ScanMatcher::linearise_all(const Viewpoint& view,
   }
   // A plane of the few points nearest to one that is matched goes through them whatever their
   // noise: that residuals against such planes are small is no witness.
-  return weighed(sum, also_nearest_ ? 1.0 : kLeastScatter, scratch);
+  return weighed(sum, also_nearest_ ? 1.0 : share_of_map(sum), scratch);
 }
 
 /// Pull along `axis` of the scan displaced to `view`, all matches sought anew.
@@ -401,7 +409,7 @@ ScanMatcher::Pull ScanMatcher::pull_at(const Viewpoint& view, const Vector3d& ax
       return;
     }
     const double h = r.plane.normal.dot(axis);
-    r.weight = weight_of(r, (view.R_odom_base * r.direction_base).dot(r.plane.normal));
+    weigh(r, (view.R_odom_base * r.direction_base).dot(r.plane.normal));
     const double pull = r.weight * r.residual_m * h;
     const double promised = r.weight * h * h;
     sums[block] += {pull, promised, pull * pull, pull * promised, promised * promised};

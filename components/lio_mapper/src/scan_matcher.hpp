@@ -52,6 +52,7 @@ class ScanMatcher {
     Eigen::Vector3d looked_up_at_odom_m;
     PlaneMatch plane;
     double residual_m;
+    double variance_m2;
     double weight;
     const MapOrigin* origin;  ///< of the plane; null: unknown, or not asked for
     bool is_of_nearest{false};
@@ -104,7 +105,7 @@ class ScanMatcher {
   Found look_up(Ask ask, Residual& residual) const;
   static bool leaves_pose_open(const Matrix6d& information);
   double variance_m2(const Residual& residual, double cos_incidence) const;
-  double weight_of(const Residual& residual, double cos_incidence) const;
+  void weigh(Residual& residual, double cos_incidence) const;
   /// Puts residual and weight of `view` into `residual` and gives its row of the Jacobian.
   template <int Size>
   typename Information<Size>::Vector row_of(Residual& residual, const Viewpoint& view) const;

@@ -161,32 +161,54 @@ PoseInformation information_of_rough_ends(float rough_m, const Pose& T) {
   return matcher.linearise(T);
 }
 
-/// Residuals of surfaces that do not scatter at all gain as much as may be gained.
-constexpr double kMostGained = 10.0;
+/// Of the points on the two walls of an axis, all at their true places.
+struct WallSums {
+  double weights{0.0};
+  double weights2{0.0};
+  double weighted_variance{0.0};
+};
+
+constexpr double kMapVariance_m2 = 2e-4;  // (1 cm)^2, and the thickness of the room's walls
+
+WallSums sums_of_walls(Eigen::Index axis) {
+  const MatchingConfig config;
+  WallSums sums;
+  for (const PointXyzi& point : room_points()) {
+    const Eigen::Vector3d p = point.position().cast<double>();
+    if (std::abs(p[axis]) > 3.9) {
+      const double cos2 = p[axis] * p[axis] / p.squaredNorm();
+      const double sideways_m = config.angle_sigma_rad * p.norm();
+      const double variance_m2 = kMapVariance_m2 + std::pow(config.range_sigma_m, 2) * cos2 +
+                                 sideways_m * sideways_m * (1.0 - cos2);
+      const double weight = cos2 / (cos2 + std::pow(config.grazing_cos, 2)) / variance_m2;
+      sums.weights += weight;
+      sums.weights2 += weight * weight;
+      sums.weighted_variance += weight * variance_m2;
+    }
+  }
+  return sums;
+}
+
+/// What surfaces gain that do not scatter at all: only the map's part of the variance is left.
+double most_gained() {
+  WallSums all;
+  for (const Eigen::Index axis : {0, 1, 2}) {
+    const WallSums sums = sums_of_walls(axis);
+    all.weights += sums.weights;
+    all.weighted_variance += sums.weighted_variance;
+  }
+  return all.weighted_variance / (kMapVariance_m2 * all.weights);
+}
 
 /// Their estimate's variance is that of the mean of such points, whatever the sensor's.
 TEST(ScanMatcher, surfaces_leave_the_pose_as_uncertain_as_residuals_scatter) {
   constexpr float kRough_m = 0.06F;  // more would leave the pose open
   const Pose T;
-  const double stated = information_of_rough_ends(0.0F, T).information(0, 0) / kMostGained;
+  const double stated = information_of_rough_ends(0.0F, T).information(0, 0) / most_gained();
   const double rough = information_of_rough_ends(kRough_m, T).information(0, 0);
   // Var(sum w r / sum w) over its stated value 1 / sum w.
-  const MatchingConfig config;
-  double weights = 0.0;
-  double weights2 = 0.0;
-  for (const PointXyzi& point : room_points()) {
-    if (std::abs(point.x) > 3.9F) {
-      const Eigen::Vector3d p = point.position().cast<double>();
-      const double cos2 = p.x() * p.x() / p.squaredNorm();
-      const double sideways_m = config.angle_sigma_rad * p.norm();
-      const double variance_m2 =
-          2e-4 + std::pow(config.range_sigma_m, 2) * cos2 + sideways_m * sideways_m * (1.0 - cos2);
-      const double weight = cos2 / (cos2 + std::pow(config.grazing_cos, 2)) / variance_m2;
-      weights += weight;
-      weights2 += weight * weight;
-    }
-  }
-  const double times_stated = kRough_m * kRough_m * weights2 / weights;
+  const WallSums ends = sums_of_walls(0);
+  const double times_stated = kRough_m * kRough_m * ends.weights2 / ends.weights;
   ASSERT_GT(times_stated, 5.0);
   EXPECT_NEAR(stated / rough, times_stated, 0.05 * times_stated);
   constexpr float kFlat_m = 0.02F;
@@ -209,7 +231,7 @@ TEST(ScanMatcher, residuals_gain_nothing_where_nearest_points_are_matched) {
     const PoseInformation sum = matcher.linearise(Pose{});
     return sum.information(1, 1) * static_cast<double>(sum.count);
   };
-  EXPECT_NEAR(information(true) / information(false), kMostGained, 1e-3 * kMostGained);
+  EXPECT_NEAR(information(true) / information(false), most_gained(), 0.01 * most_gained());
 }
 
 /// A wrong prediction is no scatter, or it would hold itself up.
