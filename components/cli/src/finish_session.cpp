@@ -94,8 +94,13 @@ void render_map(const std::string& session) {
 
 int finish_session(const std::string& session) {
   evaluation::check_is_session(session);  // before anything is written into the folder
-  render_map(session);
-  const evaluation::ReportResult report = evaluation::write_report(session);
+  evaluation::ReportOptions options;
+  try {
+    render_map(session);
+  } catch (const std::runtime_error& error) {  // what was driven is reported all the same
+    options.failures.push_back(std::string("The map was not rendered: ") + error.what() + ".");
+  }
+  const evaluation::ReportResult report = evaluation::write_report(session, options);
   std::cout << report.text << "\n" << report.report_file << "\n";
   if (!report.page_file.empty()) {
     std::cout << report.page_file << "\n";

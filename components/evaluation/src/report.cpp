@@ -122,7 +122,10 @@ ReportResult write_report(const std::string& session_folder, const ReportOptions
   ReportResult result;
   result.problems = data.problems;
   const Accounting found = account(data);
-  result.failures = find_failures(data, found);
+  result.failures = options.failures;
+  for (std::string& failure : find_failures(data, found)) {
+    result.failures.push_back(std::move(failure));
+  }
   if (options.pictures) {
     draw_all(data, options, result);
   }

@@ -2,6 +2,8 @@
 // Copyright the Trigpoint developers
 #include "trigpoint/evaluation/comparison.hpp"
 
+#include "trigpoint/base/config.hpp"
+
 #include "made_session.hpp"
 #include "made_trajectories.hpp"
 #include "run_command.hpp"
@@ -143,6 +145,26 @@ TEST(Comparison, is_drawn_for_each_reference) {
   for (const std::string& picture : pictures) {
     EXPECT_GT(std::filesystem::file_size(picture), 5000U) << picture;
   }
+}
+
+TEST(Comparison, of_a_session_names_what_it_left_out) {
+  const TemporaryFolder folder;
+  test::make_session(folder.path("s"));
+  tests::write_file(folder.path("s") + "/fused.tum", "nonsense\n");
+  tests::write_file(folder.path("s") + "/config.yaml", "robot: [1\n");
+  std::filesystem::remove(folder.path("s") + "/gps.tum");
+  const Comparison comparison = compare({folder.path("s"), "", "", ""});
+  EXPECT_THAT(comparison.damaged,
+              testing::UnorderedElementsAre(HasSubstr("fused.tum:1"), HasSubstr("config.yaml: ")));
+  EXPECT_THAT(comparison.remarks,
+              AllOf(Contains(HasSubstr("No error of fused.tum")),
+                    Contains(HasSubstr("No error of gps.tum"))));
+}
+
+TEST(Comparison, of_a_file_with_nothing_is_wrong_usage) {
+  const TemporaryFolder folder;
+  test::make_session(folder.path("s"));
+  EXPECT_THROW(compare({folder.path("s") + "/fused.tum", "", "", ""}), ConfigError);
 }
 
 }  // namespace
