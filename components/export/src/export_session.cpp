@@ -2,6 +2,7 @@
 // Copyright the Trigpoint developers
 #include "trigpoint/export/export_session.hpp"
 
+#include "trigpoint/base/config.hpp"
 #include "trigpoint/export/correct_session.hpp"
 #include "trigpoint/export/session.hpp"
 
@@ -84,20 +85,23 @@ void check_for_results(const std::string& session) {
 
 void check(const Work& work) {
   if (!fs::is_directory(work.session)) {
-    throw std::runtime_error(work.session + ": is not a session folder");
+    throw ConfigError(work.session + ": is not a session folder");
   }
   const auto& known = export_formats();
   for (const std::string& name : work.options.formats) {
     if (std::none_of(known.begin(), known.end(), [&](const auto& f) { return f.name == name; })) {
-      throw std::runtime_error("unknown format '" + name + "', there are: " + names_of_formats());
+      throw ConfigError("unknown format '" + name + "', there are: " + names_of_formats());
     }
   }
   if (work.options.tile_m > 0.0 && work.options.tile_m < kSmallestTile_m) {
-    throw std::runtime_error("tiles must have an edge of 1 m or more, got " +
-                             std::to_string(work.options.tile_m) + " m");
+    throw ConfigError("tiles must have an edge of 1 m or more, got " +
+                      std::to_string(work.options.tile_m) + " m");
   }
   if (fs::exists(work.out) && fs::equivalent(work.session, work.out)) {
-    throw std::runtime_error(work.out + ": is the session itself, choose another folder");
+    throw ConfigError(work.out + ": is the session itself, choose another folder");
+  }
+  if (fs::exists(work.out) && !fs::is_directory(work.out)) {
+    throw ConfigError(work.out + ": is no folder, choose another name");
   }
   check_for_results(work.session);
 }
@@ -134,8 +138,8 @@ void refuse_to_overwrite(const Work& work) {
     }
   }
   if (!there.empty()) {
-    throw std::runtime_error(work.out + ": holds " + there +
-                             " already, and nothing is ever written over; choose another folder");
+    throw ConfigError(work.out + ": holds " + there +
+                      " already, and nothing is ever written over; choose another folder");
   }
 }
 
