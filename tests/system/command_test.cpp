@@ -492,6 +492,11 @@ TEST(Command, a_session_whose_keyframes_are_damaged_is_reported_all_the_same) {
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.output, HasSubstr("The map was not rendered"));
   EXPECT_THAT(tests::read_file(folder.path("s") + "/report.md"), HasSubstr("keyframes.sqlite"));
+  fs::remove(folder.path("s") + "/report.md");
+  fs::create_directory(folder.path("s") + "/report.md");  // it can't be written: a full disk
+  const CommandResult full = trigpoint({"report", folder.path("s")});
+  EXPECT_EQ(full.exit_code, 1);
+  EXPECT_THAT(full.output, AllOf(HasSubstr("The map was not rendered"), HasSubstr("report.md")));
 }
 
 TEST(Command, simulate_names_the_next_command_as_a_shell_takes_it) {

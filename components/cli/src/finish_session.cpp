@@ -99,6 +99,7 @@ int finish_session(const std::string& session) {
     render_map(session);
   } catch (const std::runtime_error& error) {  // what was driven is reported all the same
     options.failures.push_back(std::string("The map was not rendered: ") + error.what() + ".");
+    std::cerr << "trigpoint report: " << options.failures.back() << "\n";
   }
   const evaluation::ReportResult report = evaluation::write_report(session, options);
   std::cout << report.text << "\n" << report.report_file << "\n";
@@ -111,8 +112,8 @@ int finish_session(const std::string& session) {
   for (const std::string& problem : report.problems) {
     std::cerr << "trigpoint report: " << problem << "\n";
   }
-  for (const std::string& failure : report.failures) {
-    std::cerr << "trigpoint report: " << failure << "\n";
+  for (std::size_t i = options.failures.size(); i < report.failures.size(); ++i) {
+    std::cerr << "trigpoint report: " << report.failures[i] << "\n";
   }
   return report.complete && report.failures.empty() ? 0 : 1;
 }
