@@ -127,6 +127,7 @@ struct FusionGate::Impl {
   RowMaker rows;
   PoseBuffer lio_poses;
   AlignmentWindow window;
+  double window_distance_m{0.0};  // driven when the window last heard of LIO
   HeadingPrior heading;
   std::set<std::string> headings_told;  // what was wrong with them, once each
   FixQueue queue;  // told of, waiting for earlier fixes and for LIO to cover their stamps

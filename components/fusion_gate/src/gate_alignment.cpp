@@ -210,7 +210,13 @@ void FusionGate::Impl::take_lio_status(const LioStatus& next, Output& out) {
     monitor.on_odom_step();
   }
   lio = next;
-  monitor.on_lio_status(next, lio_poses.distance_m());
+  const double distance_m = lio_poses.distance_m();
+  if (!aligned()) {
+    const Eigen::Vector3d sigma_odom_m(next.sigma[0], next.sigma[1], next.sigma[2]);
+    window.on_lio(sigma_odom_m.cwiseAbs2(), std::max(0.0, distance_m - window_distance_m));
+  }
+  window_distance_m = distance_m;
+  monitor.on_lio_status(next, distance_m);
   if (aligned()) {
     alignment_not_taken = false;
     placements.add(next, lio_poses.distance_m());

@@ -25,6 +25,16 @@ constexpr double kLeastRange_m = 1e-3;
 constexpr double kOpenPosition_m = 0.01;
 constexpr double kOpenRotation_rad = 2e-3;
 constexpr double kLeastInformation = 1e-3;  // of directions that no residual sees
+/// Of the stated variance of residuals that are known to scatter less: what a scan shares with the
+/// map scatters in neither.
+constexpr double kLeastScatter = 0.1;
+/// By so much a scan is displaced to see whether it is pulled back: within this other points become
+/// the nearest, and surfaces are still found.
+constexpr double kDisplaced_m = 0.25;
+/// So many points tell that.
+constexpr std::size_t kDisplacedPoints = 1000;
+/// A share of the information that is less certain than this many sigmas is none.
+constexpr double kCertainShare_sigmas = 2.0;
 /// FAST-LIO2's acceptance 1 - 0.9 |r| / sqrt(range) > 0.9: near points must fit more closely.
 constexpr double kGatePerRootRange = 1.0 / 9.0;
 /// Planes of few points look thinner than they are.
@@ -60,15 +70,18 @@ void add_row(const typename Information<Size>::Vector& h,
 /// Models, 1987, ch. 1]. Along each principal axis of the position's information A, with N of it
 /// noise and f = 1 - N / A: the solution g / (A - N) has the variance A / (A - N)^2, which is that
 /// of the information f^2 A with the gradient f g.
+/// Along no axis is more left than `pulled_back` says.
 template <int Size>
-typename Information<Size>::Matrix noise_free_share(const Information<Size>& sum) {
+typename Information<Size>::Matrix noise_free_share(const Information<Size>& sum,
+                                                    const Eigen::Matrix3d& pulled_back) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(
       sum.information.template topLeftCorner<3, 3>());
   Eigen::Matrix3d keep = Eigen::Matrix3d::Zero();
   for (int i = 0; i < 3; ++i) {
     const Vector3d axis = axes.eigenvectors().col(i);
     const double noise = axis.dot(sum.noise * axis);
-    const double share = std::max(0.0, 1.0 - noise / (axes.eigenvalues()[i] + 1e-12));
+    const double share = std::min(std::max(0.0, 1.0 - noise / (axes.eigenvalues()[i] + 1e-12)),
+                                  axis.dot(pulled_back * axis));
     keep += share * axis * axis.transpose();
   }
   typename Information<Size>::Matrix by = Information<Size>::Matrix::Identity();
@@ -80,22 +93,22 @@ typename Information<Size>::Matrix noise_free_share(const Information<Size>& sum
 /// their estimate is as much less certain: with A = L L^T and B = sum w^2 r^2 h h^T its covariance
 /// is A^-1 B A^-1 [H. White, "A heteroskedasticity-consistent covariance matrix estimator", 1980],
 /// and the eigenvalues of L^-1 B L^-T are how many times the stated variance that is, direction by
-/// direction. Each such direction keeps its estimate and loses that share of its information;
-/// where they scatter less, nothing is gained: what a scan shares with the map scatters in neither.
+/// direction. Each such direction keeps its estimate and loses that share of its information, or
+/// gains it where they scatter less, down to `least` of the stated variance.
 template <int Size>
 void allow_for_scatter(const typename Information<Size>::Matrix& scatter,
                        const Eigen::LLT<typename Information<Size>::Matrix>& root,
                        const typename Information<Size>::Vector& step,
+                       double least,
                        Information<Size>& sum) {
   using Matrix = typename Information<Size>::Matrix;
-  const Matrix half = root.matrixL().solve(scatter);
+  // What no residual sees scatters as the root says, neither more nor less.
+  const Matrix half =
+      root.matrixL().solve((scatter + kLeastInformation * Matrix::Identity()).eval());
   const Matrix times_stated = root.matrixL().solve(half.transpose());
   const Eigen::SelfAdjointEigenSolver<Matrix> eigen(times_stated);
-  if (!(eigen.eigenvalues()[Size - 1] > 1.0)) {
-    return;
-  }
   const Matrix directions = root.matrixL() * eigen.eigenvectors();
-  sum.information = directions * eigen.eigenvalues().cwiseMax(1.0).cwiseInverse().asDiagonal() *
+  sum.information = directions * eigen.eigenvalues().cwiseMax(least).cwiseInverse().asDiagonal() *
                     directions.transpose();
   sum.gradient = -(sum.information * step).eval();
 }
@@ -180,6 +193,7 @@ void ScanMatcher::refresh(std::size_t i, const Viewpoint& view, const MapOrigins
   const bool ask_nearest = also_nearest_ && found_[i] == Found::kNothing;
   if (ask_nearest) {
     found_[i] = look_up(&LocalMap::match_nearest, r);
+    r.is_of_nearest = found_[i] == Found::kPlane;
     found_[i] = found_[i] == Found::kNothing ? Found::kMisfit : found_[i];
   }
   if (origins != nullptr && found_[i] == Found::kPlane && (!kept || ask_nearest)) {
@@ -321,14 +335,22 @@ Information<Size> ScanMatcher::sum_of_all(const Viewpoint& view,
     sum.weighted_thickness2 += part.weighted_thickness2;
     sum.count += part.count;
   }
+  return sum;
+}
+
+/// What the sum over all residuals is worth.
+template <int Size>
+Information<Size> ScanMatcher::weighed(Information<Size> sum,
+                                       double least_scatter,
+                                       Scratch<Size>& scratch) {
   if (sum.count == 0) {
     return sum;
   }
   using Matrix = typename Information<Size>::Matrix;
-  const Matrix by = noise_free_share(sum);
+  const Matrix by = noise_free_share(sum, pulled_back_);
   const Eigen::LLT<Matrix> root(sum.information + kLeastInformation * Matrix::Identity());
   const typename Information<Size>::Vector step = -root.solve(sum.gradient);
-  allow_for_scatter(scatter_after(step, scratch), root, step, sum);
+  allow_for_scatter(scatter_after(step, scratch), root, step, least_scatter, sum);
   const auto most = static_cast<std::size_t>(config_.max_patches);
   const double scale =
       static_cast<double>(std::min(count_patches(), most)) / static_cast<double>(sum.count);
@@ -344,12 +366,86 @@ Information<Size> ScanMatcher::linearise_all(const Viewpoint& view,
                                              Scratch<Size>& scratch) {
   Information<Size> sum = sum_of_all(view, origins, scratch);
   if (!std::exchange(judged_, true)) {
-    also_nearest_ = leaves_pose_open(sum.information.template topLeftCorner<6, 6>());
+    const auto cautious = weighed(sum, 1.0, scratch);
+    also_nearest_ = leaves_pose_open(cautious.information.template topLeftCorner<6, 6>());
     if (also_nearest_) {
       sum = sum_of_all(view, origins, scratch);
+      const bool any_nearest = std::any_of(
+          residuals_.begin(), residuals_.end(), [](const Residual& r) { return r.is_of_nearest; });
+      if (any_nearest) {
+        const auto promised = weighed(sum, 1.0, scratch);
+        pulled_back_ = share_pulled_back(view, promised.information.template topLeftCorner<3, 3>());
+      }
     }
   }
+  // A plane of the few points nearest to one that is matched goes through them whatever their
+  // noise: that residuals against such planes are small is no witness.
+  return weighed(sum, also_nearest_ ? 1.0 : kLeastScatter, scratch);
+}
+
+/// Pull along `axis` of the scan displaced to `view`, all matches sought anew.
+ScanMatcher::Pull ScanMatcher::pull_at(const Viewpoint& view, const Vector3d& axis) {
+  std::vector<Pull> sums(blocks_of(residuals_.size()));
+  const std::size_t every = residuals_.size() / kDisplacedPoints + 1;
+  in_blocks([&](std::size_t block, std::size_t i) {
+    if (i % every != 0) {
+      return;
+    }
+    Residual r = residuals_[i];
+    r.looked_up_at_odom_m = view.R_odom_base * r.point_base_m + view.T_odom_base.p;
+    Found found = look_up(&LocalMap::match_surface, r);
+    if (found == Found::kNothing) {
+      found = look_up(&LocalMap::match_nearest, r);
+    }
+    if (found == Found::kNothing) {
+      return;
+    }
+    const double h = r.plane.normal.dot(axis);
+    r.weight = weight_of(r, (view.R_odom_base * r.direction_base).dot(r.plane.normal));
+    const double pull = r.weight * r.residual_m * h;
+    const double promised = r.weight * h * h;
+    sums[block] += {pull, promised, pull * pull, pull * promised, promised * promised};
+  });
+  Pull sum;
+  for (const Pull& part : sums) {
+    sum += part;
+  }
   return sum;
+}
+
+/// Where surfaces are volumes, as crowns are, or planes lie as chance and the rings' pattern lay
+/// them, a scan that is moved finds other planes beside each point and is content: residuals that
+/// are linearised promise a pull back that does not come, and hold the estimate at its prediction.
+/// (Asked only where nearest points were matched: surfaces alone are held to be some.) Along each
+/// axis that is open: by how much of what A promises the gradient really changes between two
+/// displaced places, the secant f A in place of the tangent A. The solution is then g / (f A), with
+/// the information f^2 A, as for noisy normals.
+Eigen::Matrix3d ScanMatcher::share_pulled_back(const Viewpoint& view,
+                                               const Eigen::Matrix3d& information) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(information);
+  Eigen::Matrix3d share = Eigen::Matrix3d::Zero();
+  for (int i = 0; i < 3; ++i) {
+    const Vector3d axis = axes.eigenvectors().col(i);
+    double along = 1.0;
+    const double promised_here = axes.eigenvalues()[i];
+    if (promised_here > kLeastInformation &&
+        promised_here < 1.0 / (kOpenPosition_m * kOpenPosition_m)) {
+      Viewpoint ahead = view;
+      Viewpoint behind = view;
+      ahead.T_odom_base.p += kDisplaced_m * axis;
+      behind.T_odom_base.p -= kDisplaced_m * axis;
+      const Pull a = pull_at(ahead, axis);
+      const Pull b = pull_at(behind, axis);
+      const double promised = kDisplaced_m * (a.information + b.information) + 1e-12;
+      const double f = (a.gradient - b.gradient) / promised;
+      // What single points pull beside f.
+      const double scatter =
+          std::max(0.0, a.scatter_about(f * kDisplaced_m) + b.scatter_about(-f * kDisplaced_m));
+      along = std::clamp(f - kCertainShare_sigmas * std::sqrt(scatter) / promised, 0.0, 1.0);
+    }
+    share += along * axis * axis.transpose();
+  }
+  return share;
 }
 
 PoseInformation ScanMatcher::linearise(const Pose& T_odom_base) {

@@ -54,7 +54,8 @@ class ScanMatcher {
     double residual_m;
     double weight;
     const MapOrigin* origin;  ///< of the plane; null: unknown, or not asked for
-    std::uint32_t patch;      ///< which cube of matching.patch_m it lies in
+    bool is_of_nearest{false};
+    std::uint32_t patch;  ///< which cube of matching.patch_m it lies in
   };
 
   /// What is put in front of the residuals of one linearisation.
@@ -72,6 +73,29 @@ class ScanMatcher {
     std::vector<typename Information<Size>::Vector> rows;  ///< of residuals
   };
 
+  /// Of a displaced scan along an axis, sums over its points: w r h, w h h, and their products.
+  struct Pull {
+    double gradient{0.0};
+    double information{0.0};
+    double gradient2{0.0};
+    double both{0.0};
+    double information2{0.0};
+
+    Pull& operator+=(const Pull& other) {
+      gradient += other.gradient;
+      information += other.information;
+      gradient2 += other.gradient2;
+      both += other.both;
+      information2 += other.information2;
+      return *this;
+    }
+
+    /// Variance of the gradient, when all residuals were expected to be `displaced_m` h.
+    double scatter_about(double displaced_m) const {
+      return gradient2 - 2.0 * displaced_m * both + displaced_m * displaced_m * information2;
+    }
+  };
+
   using Ask = bool (LocalMap::*)(const Eigen::Vector3d&, PlaneMatch&) const;
 
   enum class Found : std::uint8_t { kNotAsked, kNothing, kMisfit, kPlane };
@@ -87,6 +111,8 @@ class ScanMatcher {
   template <int Size>
   typename Information<Size>::Matrix scatter_after(const typename Information<Size>::Vector& step,
                                                    Scratch<Size>& scratch);
+  Pull pull_at(const Viewpoint& view, const Eigen::Vector3d& axis_odom);
+  Eigen::Matrix3d share_pulled_back(const Viewpoint& view, const Eigen::Matrix3d& information);
   void number_patches();
   std::size_t count_patches();
   template <typename Visit>
@@ -95,6 +121,8 @@ class ScanMatcher {
   Information<Size> sum_of_all(const Viewpoint& view,
                                const MapOrigins* origins,
                                Scratch<Size>& scratch);
+  template <int Size>
+  Information<Size> weighed(Information<Size> sum, double least_scatter, Scratch<Size>& scratch);
   template <int Size>
   Information<Size> linearise_all(const Viewpoint& view,
                                   const MapOrigins* origins,
@@ -107,6 +135,7 @@ class ScanMatcher {
   Workers& workers_;
   bool judged_{false};  ///< whether surfaces are enough for this scan
   bool also_nearest_{false};
+  Eigen::Matrix3d pulled_back_{Eigen::Matrix3d::Identity()};  ///< see share_pulled_back
   std::vector<Residual> residuals_;  ///< one a point, also where none was found
   std::vector<Found> found_;
   std::vector<std::uint8_t> patches_;  ///< whether a residual lies in it

@@ -67,10 +67,10 @@ TEST(SystemConfig, refuses_a_wrong_key_or_value_with_file_line_and_key) {
 TEST(SystemConfig, refuses_a_gate_whose_rows_the_mapper_would_find_too_old) {
   const ScratchFolder folder;
   SystemConfig config;
-  test::write_all(folder.file("a.yaml"), "fusion_gate: {max_fix_age_s: 1.4}\n");
+  test::write_all(folder.file("a.yaml"), "fusion_gate: {max_fix_age_s: 2.4}\n");
   EXPECT_THAT(error_of([&] { load(config, {folder.file("a.yaml")}); }),
               AllOf(HasSubstr("max_fix_age_s"), HasSubstr("history_s")));
-  test::write_all(folder.file("b.yaml"), "lio_mapper: {rows: {history_s: 2.0}}\n");
+  test::write_all(folder.file("b.yaml"), "lio_mapper: {rows: {history_s: 3.0}}\n");
   load(config, {folder.file("a.yaml"), folder.file("b.yaml")});
 }
 

@@ -80,6 +80,21 @@ TEST(AlignmentWindow, stays_bounded_on_a_long_drive) {
   EXPECT_LT(window.solution()->baseline_m, 1.1 * config.window_m);
 }
 
+TEST(AlignmentWindow, counts_what_lio_may_have_slid) {
+  AlignmentWindow held({});
+  AlignmentWindow slid({});
+  for (double distance_m = 0.0; distance_m < 30.0; distance_m += 0.5) {
+    const double sigma_m = 0.2 * distance_m;  // scans do not hold x
+    held.on_lio(Eigen::Vector3d::Constant(2.5e-5), 0.5);
+    slid.on_lio({sigma_m * sigma_m, 2.5e-5, 2.5e-5}, 0.5);
+    held.add(pair_at(distance_m));
+    slid.add(pair_at(distance_m));
+  }
+  EXPECT_LT(held.solution()->yaw_sigma_rad(), 0.01);
+  // odom's x lies 2 rad from east: both axes of map have their share.
+  EXPECT_GT(slid.solution()->yaw_sigma_rad(), 3.0 * held.solution()->yaw_sigma_rad());
+}
+
 TEST(AlignmentWindow, begins_anew_when_cleared) {
   AlignmentWindow window({});
   window.add(pair_at(1.0));

@@ -215,27 +215,27 @@ TEST(FusionGate, uses_late_statuses_at_the_stamp_of_their_fix) {
 
 TEST(FusionGate, refuses_fixes_that_are_too_late_with_the_numbers) {
   Scenario scenario;
-  scenario.fix_latency_s = 1.5;
+  scenario.fix_latency_s = 2.5;
   const Record record = SimulatedDrive{scenario}.run();
   EXPECT_TRUE(record.updates.empty());
-  EXPECT_THAT(record.statuses.back().verdict.reason, HasSubstr("s behind LIO, limit 1.30 s"));
+  EXPECT_THAT(record.statuses.back().verdict.reason, HasSubstr("s behind LIO, limit 2.30 s"));
   EXPECT_GT(count_of(record.statuses.back(), "late"), 100U);
 }
 
 TEST(FusionGate, makes_no_row_that_the_mapper_would_find_too_old) {
-  constexpr double kMapperHistory_s = 1.5;  // its rows.history_s
+  constexpr double kMapperHistory_s = 2.5;  // its rows.history_s
   SimulatedDrive drive{Scenario{}};
   drive.run_until(20.0);
   drive.lio_alive = false;  // scans come late; odometry at IMU rate goes on
-  drive.run_until(22.0);
+  drive.run_until(23.0);
   const std::size_t before = drive.record().updates.size();
-  for (int k = 0; k < 20; ++k) {
+  for (int k = 0; k < 30; ++k) {
     drive.keep(drive.gate().on_lio_odometry(drive.lio_odometry(20.0 + 0.1 * k)));
   }
   const std::vector<StateUpdate>& updates = drive.record().updates;
   ASSERT_GT(updates.size(), before);
   for (std::size_t k = before; k < updates.size(); ++k) {
-    EXPECT_LE(to_seconds(drive.stamp(21.99) - updates[k].fix_stamp_ns), kMapperHistory_s);
+    EXPECT_LE(to_seconds(drive.stamp(22.99) - updates[k].fix_stamp_ns), kMapperHistory_s);
   }
   EXPECT_EQ(count_of(drive.record().statuses.back(), "late"), 3U);  // of 20.0, 20.2 and 20.4 s
 }

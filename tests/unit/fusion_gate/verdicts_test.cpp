@@ -201,7 +201,7 @@ TEST(FusionGateVerdicts, refuse_a_value_that_turned_nan_while_its_fix_waited) {
   filter.status().recent_fixes[0].antenna_map_m.y() = kNaN;
   filter.tell(1000.3);
   filter.lio_at(1000.2);
-  filter.lio_at(1001.9);
+  filter.lio_at(1002.9);
   EXPECT_EQ(count_of(filter.last(), "not_finite"), 1U);
   EXPECT_EQ(filter.verdicts(), 1U);
 }

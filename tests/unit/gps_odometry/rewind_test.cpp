@@ -142,7 +142,7 @@ TEST_P(Rewind, refuses_and_counts_a_fix_older_than_the_buffer) {
   for (int i = 0; i < 300; ++i) {
     filter.on_imu(imu_at(0.01 * i));
   }
-  const GpsStatus status = *filter.on_fix(fix_at({0.0, 0.0, 0.0}, 1.4, 0.014)).status;
+  const GpsStatus status = *filter.on_fix(fix_at({0.0, 0.0, 0.0}, 0.4, 0.014)).status;
   EXPECT_EQ(count_of(status, "too_old"), 1U);
   EXPECT_EQ(status.fixes_accepted, 0U);
   EXPECT_EQ(filter.on_fix(fix_at({0.0, 0.0, 0.0}, 2.1, 0.014)).status->fixes_accepted, 1U);

@@ -58,7 +58,7 @@ class RoomDrive {
       cloud.fields.push_back({names[i], 4 * i, 7, 1});
     }
     cloud.point_step = 20;
-    std::mt19937 noise(static_cast<unsigned>(begin_ns / 1'000'000));
+    std::mt19937 noise(noise_seed + static_cast<unsigned>(begin_ns / 1'000'000));
     std::normal_distribution<double> range_noise(0.0, range_sigma_m);
     for (int a = 0; a < azimuths; ++a) {
       const double time_s = 0.1 * a / (azimuths - 1);
@@ -83,6 +83,7 @@ class RoomDrive {
   Eigen::Vector3d gyro_bias_radps{0.002, -0.003, 0.001};
   Eigen::Vector3d accel_bias_mps2{0.0, 0.0, 0.0};
   double range_sigma_m{0.01};
+  unsigned noise_seed{0};
 
  private:
   static constexpr double kPi = 3.14159265358979323846;

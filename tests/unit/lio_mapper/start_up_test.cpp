@@ -4,7 +4,12 @@
 
 #include "trigpoint/base/so3.hpp"
 
+#include "room_drive.hpp"
+#include "sweep.hpp"
 #include <gtest/gtest.h>
+
+#include <deque>
+#include <variant>
 
 namespace trigpoint::lio_mapper {
 
@@ -81,6 +86,45 @@ TEST(StartUp, says_when_the_imu_is_upside_down_or_gravity_was_taken_out) {
   EXPECT_EQ(check_specific_force(-kUp, 0)->code, "imu_upside_down");
   EXPECT_EQ(check_specific_force({0.1, 0.1, 0.0}, 0)->code, "imu_force_implausible");
   EXPECT_FALSE(check_specific_force(kUp, 0).has_value());
+}
+
+/// What the mapper has when it starts: a second of IMU and of sweeps.
+StartResult start_of(const testing_support::RoomDrive& drive) {
+  constexpr Nanoseconds kSweep_ns = 100'000'000;
+  Config config;
+  SweepDecoder decoder(config.sweep);
+  ImuBuffer imu;
+  std::deque<Sweep> sweeps;
+  Events events;
+  for (int i = 0; i < 10; ++i) {
+    sweeps.push_back(std::get<Sweep>(
+        decoder.decode(drive.sweep_at(drive.kEpoch_ns + i * kSweep_ns, 150), events)));
+  }
+  for (int i = 0; i <= 220; ++i) {
+    const ImuSample sample = drive.imu_at(drive.kEpoch_ns + i * 5'000'000);
+    imu.push({sample.stamp_ns, sample.gyro_radps, sample.accel_mps2});
+  }
+  return start(config, Pose{}, imu, sweeps);
+}
+
+/// Two sweeps of a coarse LiDAR seem to move by decimetres a second.
+TEST(StartUp, knows_that_it_stands_although_two_noisy_sweeps_seem_to_move) {
+  for (const unsigned seed : {1U, 2U, 3U, 4U, 5U, 6U}) {
+    testing_support::RoomDrive drive(10.0);
+    drive.range_sigma_m = 0.03;
+    drive.noise_seed = seed;
+    const StartResult result = start_of(drive);
+    ASSERT_FALSE(result.trouble.has_value());
+    EXPECT_TRUE(result.at_rest) << "speed " << result.speed_mps << " m/s";
+  }
+}
+
+TEST(StartUp, knows_that_it_drives_although_the_imu_is_quiet) {
+  testing_support::RoomDrive drive(0.0, 2.0);
+  const StartResult result = start_of(drive);
+  ASSERT_FALSE(result.trouble.has_value());
+  EXPECT_FALSE(result.at_rest);
+  EXPECT_NEAR(result.speed_mps, 2.0, 0.1);
 }
 
 }  // namespace

@@ -20,6 +20,10 @@ class AlignmentWindow {
   /// not newer than it).
   bool add(const AlignmentPair& pair);
 
+  /// LIO has come `moved_m` farther, with the variances of its place in its local map, axes of
+  /// odom: where scans do not hold it, the pairs so far and those to come may lie that far apart.
+  void on_lio(const Eigen::Vector3d& variance_odom_m2, double moved_m);
+
   void clear();
 
   /// What a measured heading says, from the next pair on. It is left out of a solution whose pairs
@@ -42,7 +46,18 @@ class AlignmentWindow {
 
   AlignmentConfig config_;
   double scale_sigma_;
+
+  /// Of a pair: the variance of LIO's place then, by how much it differed most from that since, and
+  /// what new map took over from it.
+  struct Slide {
+    Eigen::Vector3d then_m2;
+    Eigen::Vector3d changed_m2{Eigen::Vector3d::Zero()};
+    Eigen::Vector3d inherited_m2{Eigen::Vector3d::Zero()};
+  };
+
+  Eigen::Vector3d lio_m2_{Eigen::Vector3d::Zero()};  ///< newest variance of LIO's place
   std::vector<AlignmentPair> pairs_;
+  std::vector<Slide> slides_;  ///< of `pairs_`
   double spacing_factor_{1.0};
   std::optional<YawPrior> heading_;
   std::optional<AlignmentSolution> solution_;

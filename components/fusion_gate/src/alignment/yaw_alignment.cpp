@@ -131,14 +131,17 @@ double tilt_covariance_m2(const AlignmentPair& a,
   return config.lio_tilt_sigma_rad * config.lio_tilt_sigma_rad * from_newest_a.dot(from_newest_b);
 }
 
-/// Gauss-Markov GPS error, LIO's random walk counted back from the newest pair (so that the
-/// solution is T_map_odom as of now), tilt of odom, and white error.
+/// Gauss-Markov GPS error, LIO's random walk and what it slid counted back from the newest pair (so
+/// that the solution is T_map_odom as of now), tilt of odom, and white error. The slide of an axis
+/// of odom is counted along east and north as if these were independent.
 Covariances residual_covariances(const std::vector<AlignmentPair>& pairs,
-                                 const AlignmentConfig& config) {
+                                 const AlignmentConfig& config,
+                                 double yaw_rad) {
   const auto n = static_cast<Eigen::Index>(pairs.size());
   const double now_m = pairs.back().distance_m;
   Covariances covariances;
   covariances.fill(Eigen::MatrixXd(n, n));
+  const Eigen::Matrix3d map_from_odom2 = from_yaw(yaw_rad).toRotationMatrix().cwiseAbs2();
   for (Eigen::Index i = 0; i < n; ++i) {
     const AlignmentPair& a = pairs[static_cast<std::size_t>(i)];
     for (Eigen::Index j = 0; j <= i; ++j) {
@@ -148,11 +151,13 @@ Covariances residual_covariances(const std::vector<AlignmentPair>& pairs,
                            (i == j ? config.white_share : 0.0);
       const double drift_m2 =
           std::min(drift_variance(a, now_m, config), drift_variance(b, now_m, config));
+      const Eigen::Vector3d slid_m2 = map_from_odom2 * a.slid_odom_m2.cwiseMin(b.slid_odom_m2);
       for (int axis = 0; axis < 3; ++axis) {
         const double value = share * std::sqrt(a.variance_map_m2[axis] * b.variance_map_m2[axis]);
         const double tilt_m2 = axis == 2 ? tilt_covariance_m2(a, b, pairs.back(), config) : 0.0;
-        covariances[static_cast<std::size_t>(axis)](i, j) = value + drift_m2 + tilt_m2;
-        covariances[static_cast<std::size_t>(axis)](j, i) = value + drift_m2 + tilt_m2;
+        const double sum_m2 = value + drift_m2 + slid_m2[axis] + tilt_m2;
+        covariances[static_cast<std::size_t>(axis)](i, j) = sum_m2;
+        covariances[static_cast<std::size_t>(axis)](j, i) = sum_m2;
       }
     }
   }
@@ -299,9 +304,9 @@ std::optional<AlignmentSolution> solve_alignment(const std::vector<AlignmentPair
   if (pairs.empty()) {
     return std::nullopt;
   }
-  const Covariances covariances = residual_covariances(pairs, config);
   const Matrix5d by_heading = information_of(heading);
   ScaledPose estimate{robust_closed_form(pairs, heading)};
+  const Covariances covariances = residual_covariances(pairs, config, estimate.T.yaw_rad);
   double off_heading_rad = 0.0;
   Linearised system;
   RobustWeights weights;

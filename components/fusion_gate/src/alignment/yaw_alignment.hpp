@@ -25,6 +25,8 @@ struct AlignmentPair {
   double distance_m{0.0};  ///< driven when the pair was made
   /// Of its variance, when the residuals testify that it is smaller: what the receiver itself says.
   double least_share{1.0};
+  /// By how much LIO may have slid since, along the axes of odom, beyond its drift.
+  Eigen::Vector3d slid_odom_m2{Eigen::Vector3d::Zero()};
 };
 
 struct AlignmentSolution {

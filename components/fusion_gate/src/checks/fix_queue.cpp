@@ -9,9 +9,11 @@ namespace trigpoint::fusion_gate {
 
 namespace {
 
-constexpr std::size_t kKnown = 32;
+constexpr std::size_t kKnown = 64;  // as long as any window, of a receiver at 20 Hz
 constexpr std::size_t kLeastKnown = 8;    // fewer do not tell the receiver's interval
 constexpr double kLongestInterval = 1.6;  // of the usual one: stamps jitter, a lost fix makes two
+/// A fix may be as much later than the latest of those before it.
+constexpr double kLaterThanUsual_s = 1.0;
 constexpr Nanoseconds kUntilTold_ns = 100'000'000;
 constexpr Nanoseconds kFarthestAhead_ns = kNanosecondsPerSecond;  // a stamp beyond has a wrong date
 
@@ -29,7 +31,13 @@ void FixQueue::hear(Nanoseconds stamp_ns, Nanoseconds now_ns) {
       return;
     }
   }
-  know(stamp_ns, now_ns + kUntilTold_ns);
+  const bool is_new = know(stamp_ns, now_ns + kUntilTold_ns);
+  if (is_new && now_ns > 0) {
+    lateness_s_.push_back(to_seconds(now_ns - stamp_ns));
+    if (lateness_s_.size() > kKnown) {
+      lateness_s_.pop_front();
+    }
+  }
 }
 
 bool FixQueue::is_far_ahead(Nanoseconds stamp_ns, Nanoseconds now_ns) {
@@ -58,7 +66,7 @@ const ToldFix* FixQueue::next(Nanoseconds now_ns) const {
     return nullptr;
   }
   const ToldFix& oldest = waiting_.front();
-  const bool waited_enough = to_seconds(now_ns - oldest.fix.stamp_ns) >= window_s_;
+  const bool waited_enough = to_seconds(now_ns - oldest.fix.stamp_ns) >= wait_s();
   return waited_enough || is_predecessor_known(oldest.fix.stamp_ns, now_ns) ? &oldest : nullptr;
 }
 
@@ -67,6 +75,15 @@ ToldFix FixQueue::take() {
   waiting_.pop_front();
   newest_judged_ns_ = std::max(newest_judged_ns_, oldest.fix.stamp_ns);
   return oldest;
+}
+
+/// From a fix's stamp, until the ones before it are held to be lost.
+double FixQueue::wait_s() const {
+  if (lateness_s_.size() < kLeastKnown) {
+    return window_s_;
+  }
+  const double latest_s = *std::max_element(lateness_s_.begin(), lateness_s_.end());
+  return std::min(window_s_, std::max(0.0, latest_s) + kLaterThanUsual_s);
 }
 
 /// From fix to fix back to one that has its verdict, or for which nobody waits any more.
@@ -85,7 +102,7 @@ bool FixQueue::is_predecessor_known(Nanoseconds stamp_ns, Nanoseconds now_ns) co
       return false;
     }
     at_ns = it->first;
-    if (at_ns <= newest_judged_ns_ || to_seconds(now_ns - at_ns) >= window_s_) {
+    if (at_ns <= newest_judged_ns_ || to_seconds(now_ns - at_ns) >= wait_s()) {
       return true;
     }
   }
@@ -106,12 +123,14 @@ std::optional<Nanoseconds> FixQueue::usual_interval_ns() const {
   return *quartile;
 }
 
-void FixQueue::know(Nanoseconds stamp_ns, Nanoseconds from_ns) {
+/// True when nobody had told of the stamp.
+bool FixQueue::know(Nanoseconds stamp_ns, Nanoseconds from_ns) {
   const auto [entry, is_new] = known_.try_emplace(stamp_ns, from_ns);
   entry->second = std::min(entry->second, from_ns);
   if (known_.size() > kKnown) {
     known_.erase(known_.begin());
   }
+  return is_new;
 }
 
 }  // namespace trigpoint::fusion_gate

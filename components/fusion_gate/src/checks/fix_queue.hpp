@@ -21,7 +21,9 @@ struct ToldFix {
 
 /// Puts fixes into the order of their stamps, so that what becomes of one depends on when it was
 /// measured and not on when it came. A fix waits as long as an earlier one may still come: not at
-/// all when the one before it, one interval of the receiver ago, is known; at most the window.
+/// all when the one before it, one interval of the receiver ago, is known; at most the window, and
+/// less where all fixes come sooner than that, so that the first one after an outage, which has no
+/// predecessor, is not held back for a lateness that this receiver does not have.
 class FixQueue {
  public:
   explicit FixQueue(double window_s) : window_s_(window_s) {}
@@ -54,13 +56,15 @@ class FixQueue {
   void clear_waiting() { waiting_.clear(); }
 
  private:
+  double wait_s() const;
   bool is_predecessor_known(Nanoseconds stamp_ns, Nanoseconds now_ns) const;
   std::optional<Nanoseconds> usual_interval_ns() const;
-  void know(Nanoseconds stamp_ns, Nanoseconds from_ns);
+  bool know(Nanoseconds stamp_ns, Nanoseconds from_ns);
 
   double window_s_;
   std::deque<ToldFix> waiting_;               // by stamp
   std::map<Nanoseconds, Nanoseconds> known_;  // stamps, and since when they count as told of
+  std::deque<double> lateness_s_;             // of the messages that were heard last
   Nanoseconds newest_judged_ns_{0};
 };
 

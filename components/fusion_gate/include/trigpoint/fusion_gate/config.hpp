@@ -61,7 +61,7 @@ struct Config {
   double min_sigma_m{0.02};                  ///< floor of a fix's sigma
   double gps_correlation_time_s{5.0};        ///< row covariance x (1 + 2 tau / dt)
   double max_inflation{100.0};               ///< of that factor
-  double max_fix_age_s{1.3};  ///< against LIO's newest stamp; so long an earlier one is waited for
+  double max_fix_age_s{2.3};  ///< against LIO's newest stamp; so long an earlier one is waited for
   double source_timeout_s{1.0};     ///< a GPS writer not heard for longer is stale
   double source_hold_s{0.3};        ///< a healthier one must stay so for this long
   double lio_timeout_s{1.0};        ///< then the GPS odometry carries fusion/odometry

@@ -76,7 +76,7 @@ struct Config {
 
   // Fix checks.
   double future_limit_s{0.1};
-  double rewind_s{1.5};
+  double rewind_s{2.5};
   double highest_speed_mps{60.0};
   double recovery_s{5.0};
   double gate_probability{0.999};

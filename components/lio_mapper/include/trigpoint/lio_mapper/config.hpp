@@ -108,7 +108,7 @@ struct DriftConfig {
 };
 
 struct RowsConfig {
-  double history_s{1.5};
+  double history_s{2.5};
   std::int64_t max_waiting{64};
 };
 
