@@ -375,6 +375,23 @@ TEST(Command, a_play_to_nobody_fails_unless_that_is_allowed) {
   EXPECT_EQ(trigpoint(allowed).exit_code, 0);
 }
 
+TEST(Command, a_play_into_the_session_of_another_one_is_refused) {
+  const TemporaryFolder folder;
+  fs::create_directories(folder.path("s"));
+  tests::write_file(folder.path("s") + "/config.yaml", "");
+  const std::vector<std::string> play{
+      "play", "short", "--duration", "1", "--allow-no-reader", "--wait", "0", "--session"};
+  std::vector<std::string> into = play;
+  into.push_back(folder.path("s"));
+  ASSERT_EQ(trigpoint(into).exit_code, 0);
+  const std::string before = tests::read_file(folder.path("s") + "/fixes.csv");
+  into[3] = "2";
+  const CommandResult again = trigpoint(into);
+  EXPECT_EQ(again.exit_code, 2);
+  EXPECT_THAT(again.output, AllOf(HasSubstr("--session"), HasSubstr("run.yaml")));
+  EXPECT_EQ(tests::read_file(folder.path("s") + "/fixes.csv"), before);
+}
+
 TEST(Command, two_players_on_one_domain_are_refused_with_the_other_one_s_process) {
   const std::map<std::string, std::string> environment{{"ROS_DOMAIN_ID", tests::own_domain(52)}};
   const tests::Command first({program(), "play", "short", "--rate", "1", "--allow-no-reader"},
@@ -471,6 +488,47 @@ TEST(Command, a_mapped_drive_is_exported_and_scored_against_its_world) {
   EXPECT_GT(std::stod(other.output.substr(other.output.find(key) + key.size())), kGoodMap_m);
 }
 
+TEST(Command, a_session_whose_keyframes_are_damaged_is_reported_all_the_same) {
+  const TemporaryFolder folder;
+  fs::create_directories(folder.path("s"));
+  tests::write_file(folder.path("s") + "/keyframes.sqlite", "this is no database");
+  const CommandResult result = trigpoint({"report", folder.path("s")});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.output, HasSubstr("The map was not rendered"));
+  EXPECT_THAT(tests::read_file(folder.path("s") + "/report.md"), HasSubstr("keyframes.sqlite"));
+  fs::remove(folder.path("s") + "/report.md");
+  fs::create_directory(folder.path("s") + "/report.md");  // it can't be written: a full disk
+  const CommandResult full = trigpoint({"report", folder.path("s")});
+  EXPECT_EQ(full.exit_code, 1);
+  EXPECT_THAT(full.output, AllOf(HasSubstr("The map was not rendered"), HasSubstr("report.md")));
+}
+
+TEST(Command, simulate_names_the_next_command_as_a_shell_takes_it) {
+  const TemporaryFolder folder;
+  const std::string drive = folder.path("it's a drive");
+  const CommandResult result =
+      trigpoint({"simulate", "short", "--duration", "1", "--no-lidar", "--out", drive});
+  ASSERT_EQ(result.exit_code, 0) << result.output;
+  const std::string words = result.output.substr(result.output.find("next: ") + 6);
+  const CommandResult echo = run_command({"sh", "-c", "printf '<%s>' " + words});
+  EXPECT_THAT(echo.output, HasSubstr("<" + drive + ">"));
+}
+
+TEST(Command, evaluate_fails_when_a_file_of_the_session_cannot_be_read) {
+  const TemporaryFolder folder;
+  fs::create_directories(folder.path("s"));
+  const std::string poses = "1700000000.0 0 0 0 0 0 0 1\n1700000000.1 1 0 0 0 0 0 1\n";
+  for (const char* name : {"lio.tum", "truth.tum"}) {
+    tests::write_file(folder.path("s") + "/" + name, "# poses\n" + poses);
+  }
+  EXPECT_EQ(trigpoint({"evaluate", folder.path("s")}).exit_code, 0);
+  tests::write_file(folder.path("s") + "/fused.tum", "nonsense\n");
+  const CommandResult result = trigpoint({"evaluate", folder.path("s")});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.output, AllOf(HasSubstr("left out, "), HasSubstr("fused.tum:1")));
+  EXPECT_EQ(trigpoint({"evaluate", folder.path("s") + "/lio.tum"}).exit_code, 2);
+}
+
 TEST(Command, record_hears_what_play_says) {
   const TemporaryFolder folder;
   const std::map<std::string, std::string> environment{{"ROS_DOMAIN_ID", tests::own_domain(50)}};
@@ -523,6 +581,31 @@ TEST(BringupRun, finds_wrong_usage_before_it_makes_a_session) {
         {{"ROS_DOMAIN_ID", tests::own_domain(53)}, {"TRIGPOINT_BIN", TRIGPOINT_BIN_DIR}});
     EXPECT_EQ(result.exit_code, 2) << each.back() << ": " << result.output;
     EXPECT_FALSE(fs::exists(session)) << each.back();
+  }
+}
+
+TEST(BringupRun, names_a_program_that_is_not_built_before_it_makes_a_session) {
+  const TemporaryFolder folder;
+  for (const char* name : {"trigpoint", "trigpoint_supervise"}) {
+    fs::create_directories(folder.path("bin"));
+    fs::create_symlink(std::string(TRIGPOINT_BIN_DIR) + "/" + name,
+                       folder.path("bin") + "/" + name);
+  }
+  const std::vector<std::pair<std::vector<std::string>, std::string>> scripts{
+      {{"run", "short"}, "trigpoint_lio_mapper"}, {{"host", "robot"}, "trigpoint_clock_watch"}};
+  for (const auto& [arguments, missing] : scripts) {
+    std::vector<std::string> command{std::string(TRIGPOINT_SOURCE_DIR) + "/bringup/" + arguments[0],
+                                     arguments[1],
+                                     "--no-build",
+                                     "--out",
+                                     folder.path("s")};
+    const CommandResult result = run_command(
+        command,
+        60s,
+        {{"ROS_DOMAIN_ID", tests::own_domain(53)}, {"TRIGPOINT_BIN", folder.path("bin")}});
+    EXPECT_EQ(result.exit_code, 1) << result.output;
+    EXPECT_THAT(result.output, HasSubstr(missing + " is not there"));
+    EXPECT_FALSE(fs::exists(folder.path("s")));
   }
 }
 

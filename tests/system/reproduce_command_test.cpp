@@ -158,6 +158,8 @@ TEST(Reproduce, says_before_the_work_what_is_wrong_with_any_drive) {
     EXPECT_FALSE(fs::exists(out)) << words;
   };
   refused({"--park", "/no/such/park.bag"}, "/no/such/park.bag");
+  tests::write_file(folder.path("letter.bag"), "dear");
+  refused({"--park", folder.path("letter.bag")}, "letter.bag");
   refused({"--park", folder.path("campus.bag")}, "imu_raw");  // the other bag's topic
   refused({"--drives", "campus,no_such_drive"}, "no_such_drive");
   refused({"--drives", "short,short"}, "short is named twice");

@@ -381,9 +381,15 @@ class Printer final : public ConfigFields {
   int depth_;
 };
 
-YAML::Node parse(const std::function<YAML::Node()>& load, const std::string& name) {
+/// Throws ConfigError when there is a second document, whose keys would count for nothing.
+YAML::Node parse(const std::function<std::vector<YAML::Node>()>& load, const std::string& name) {
   try {
-    return load();
+    const std::vector<YAML::Node> documents = load();
+    if (documents.size() > 1) {
+      throw ConfigError(name + ":" + std::to_string(documents[1].Mark().line + 1) +
+                        ": a second document begins after ---, one is expected");
+    }
+    return documents.empty() ? YAML::Node() : documents.front();
   } catch (const YAML::BadFile&) {
     throw ConfigError(name + ": cannot be read: no such file, or no permission");
   } catch (const YAML::Exception& error) {
@@ -408,14 +414,14 @@ void load_config(const std::vector<std::string>& files,
     if (std::error_code ignored; std::filesystem::is_directory(file, ignored)) {
       throw ConfigError(file + ": is a folder; a YAML file is expected");
     }
-    visit(parse([&file] { return YAML::LoadFile(file); }, file), file, document);
+    visit(parse([&file] { return YAML::LoadAllFromFile(file); }, file), file, document);
   }
 }
 
 void load_config_text(const std::string& yaml,
                       const std::string& name,
                       const std::function<void(ConfigFields&)>& document) {
-  visit(parse([&yaml] { return YAML::Load(yaml); }, name), name, document);
+  visit(parse([&yaml] { return YAML::LoadAll(yaml); }, name), name, document);
 }
 
 std::string print_config(const std::function<void(ConfigFields&)>& document) {

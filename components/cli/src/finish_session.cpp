@@ -94,8 +94,14 @@ void render_map(const std::string& session) {
 
 int finish_session(const std::string& session) {
   evaluation::check_is_session(session);  // before anything is written into the folder
-  render_map(session);
-  const evaluation::ReportResult report = evaluation::write_report(session);
+  evaluation::ReportOptions options;
+  try {
+    render_map(session);
+  } catch (const std::runtime_error& error) {  // what was driven is reported all the same
+    options.failures.push_back(std::string("The map was not rendered: ") + error.what() + ".");
+    std::cerr << "trigpoint report: " << options.failures.back() << "\n";
+  }
+  const evaluation::ReportResult report = evaluation::write_report(session, options);
   std::cout << report.text << "\n" << report.report_file << "\n";
   if (!report.page_file.empty()) {
     std::cout << report.page_file << "\n";
@@ -106,8 +112,8 @@ int finish_session(const std::string& session) {
   for (const std::string& problem : report.problems) {
     std::cerr << "trigpoint report: " << problem << "\n";
   }
-  for (const std::string& failure : report.failures) {
-    std::cerr << "trigpoint report: " << failure << "\n";
+  for (std::size_t i = options.failures.size(); i < report.failures.size(); ++i) {
+    std::cerr << "trigpoint report: " << report.failures[i] << "\n";
   }
   return report.complete && report.failures.empty() ? 0 : 1;
 }

@@ -22,7 +22,9 @@ namespace fs = std::filesystem;
 
 /// A folder made by `trigpoint simulate`: log/, truth.tum, scenario.yaml.
 bool is_simulated_drive(const fs::path& folder) {
-  return fs::is_directory(folder / "log") && fs::is_regular_file(folder / "scenario.yaml");
+  std::error_code unreadable;  // told with its name when it is opened
+  return fs::is_directory(folder / "log", unreadable) &&
+         fs::is_regular_file(folder / "scenario.yaml", unreadable);
 }
 
 /// Hands everything on and knows where the truth of a simulated drive lies.
@@ -115,23 +117,28 @@ void check_cores(const SystemConfig& config) {
   const pipeline::Lockstep cores(config.cores);
 }
 
-/// A topic that the user named and that is not in the log, whatever else is wrong with it.
-bool names_an_absent_topic(const std::string& log, const SystemConfig& config) {
+/// Whether the user named a topic that the log does not have as this type, whatever else is wrong
+/// with it.
+bool names_a_wrong_topic(const std::string& log, const SystemConfig& config) {
   recording::LogOptions any = config.log;
   any.require_points = any.require_imu = any.require_fix = any.require_aiding = false;
   const RobotConfig defaults;
   const RobotConfig& robot = config.cores.robot;
+  RobotConfig nothing;  // of a log, so that it is opened
+  nothing.points_topic = nothing.imu_topic = nothing.fix_topic = "";
   try {
-    const auto topics = recording::open_log(log, robot, any)->summary().topics;
-    const auto is_absent = [&](const std::string RobotConfig::*topic) {
+    const auto topics = recording::open_log(log, nothing, any)->summary().topics;
+    const auto is_wrong = [&](const std::string RobotConfig::*topic, const std::string& type) {
       return robot.*topic != defaults.*topic &&
              std::none_of(topics.begin(), topics.end(), [&](const auto& there) {
-               return there.topic == robot.*topic || there.topic == "/" + robot.*topic;
+               return (there.topic == robot.*topic || there.topic == "/" + robot.*topic) &&
+                      (type.empty() || there.type == type);
              });
     };
-    return is_absent(&RobotConfig::points_topic) || is_absent(&RobotConfig::imu_topic) ||
-           is_absent(&RobotConfig::fix_topic) || is_absent(&RobotConfig::twist_topic) ||
-           is_absent(&RobotConfig::yaw_topic);
+    return is_wrong(&RobotConfig::points_topic, "sensor_msgs/msg/PointCloud2") ||
+           is_wrong(&RobotConfig::imu_topic, "sensor_msgs/msg/Imu") ||
+           is_wrong(&RobotConfig::fix_topic, "sensor_msgs/msg/NavSatFix") ||
+           is_wrong(&RobotConfig::twist_topic, "") || is_wrong(&RobotConfig::yaw_topic, "");
   } catch (const recording::LogError&) {
     return false;
   }
@@ -142,7 +149,7 @@ std::unique_ptr<recording::LogReader> open_recorded(const std::string& log,
   try {
     return recording::open_log(log, config.cores.robot, config.log);
   } catch (const recording::LogError& error) {
-    if (names_an_absent_topic(log, config)) {
+    if (names_a_wrong_topic(log, config)) {
       throw ConfigError(error.what());
     }
     throw;
@@ -176,7 +183,8 @@ Input open_scenario(const InputOptions& options, const std::string& truth_file) 
   return input;
 }
 
-/// The folder made by `trigpoint simulate` that `path` is, or is the log/ of, if so.
+/// The folder made by `trigpoint simulate` that `path` is, or is the log/ of, or a file of that, if
+/// so.
 std::optional<fs::path> simulated_drive_of(const fs::path& path) {
   fs::path plain = fs::absolute(path).lexically_normal();
   if (!plain.has_filename()) {
@@ -184,6 +192,9 @@ std::optional<fs::path> simulated_drive_of(const fs::path& path) {
   }
   if (is_simulated_drive(plain)) {
     return plain;
+  }
+  if (fs::is_regular_file(plain)) {
+    plain = plain.parent_path();
   }
   const bool is_its_log = plain.filename() == "log" && is_simulated_drive(plain.parent_path());
   return is_its_log ? std::optional(plain.parent_path()) : std::nullopt;
@@ -194,7 +205,9 @@ Input open_simulated_drive(const InputOptions& options, const fs::path& folder) 
       simulator::load_scenario((folder / "scenario.yaml").string());
   Input input;
   input.config = configure(options, {scenario.robot, scenario.datum});
-  input.reader = open_recorded((folder / "log").string(), input.config);
+  const std::string log =
+      fs::is_regular_file(options.log) ? options.log : (folder / "log").string();
+  input.reader = open_recorded(log, input.config);
   const fs::path truth = folder / "truth.tum";
   if (fs::is_regular_file(truth)) {
     input.reader = std::make_unique<WithTruth>(std::move(input.reader), truth.string());
@@ -246,7 +259,7 @@ void add_scenario_options(CLI::App& verb, ScenarioChanges& changes) {
   verb.add_option("--beams", changes.beams, "of a scenario's LiDAR: 16, 32 or 64")
       ->check(CLI::IsMember({16, 32, 64}));
   verb.add_option("--start", changes.start_m, "along a scenario's route: where the drive begins, m")
-      ->check(CLI::NonNegativeNumber);
+      ->check(zero_or_more());
   verb.add_option("--day",
                   changes.day,
                   "of a scenario: the same world (with the same seed), other noise, later stamps")

@@ -35,6 +35,16 @@ CLI::Validator more_than_zero() {
   return CLI::Validator(check, "> 0");
 }
 
+CLI::Validator zero_or_more() {
+  const auto check = [](const std::string& text) -> std::string {
+    const auto value = read<double>(text);
+    return value && std::isfinite(*value) && *value >= 0.0
+               ? ""
+               : "must be a number of 0 or more; is '" + text + "'";
+  };
+  return CLI::Validator(check, ">= 0");
+}
+
 CLI::Validator whole_number() {
   const auto check = [](const std::string& text) -> std::string {
     return read<std::uint64_t>(text)

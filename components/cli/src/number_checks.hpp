@@ -15,6 +15,9 @@ namespace trigpoint::cli {
 /// Finite and more than 0.
 CLI::Validator more_than_zero();
 
+/// Finite and not negative.
+CLI::Validator zero_or_more();
+
 /// A whole number from 0 to 2^64 - 1, in decimal digits only: CLI11 lets -1 wrap around.
 CLI::Validator whole_number();
 

@@ -155,7 +155,11 @@ std::vector<DriveToRun> drives_of(const ReproduceOptions& options) {
   }
   check_names(drives);
   for (const DriveToRun& drive : drives) {
-    open_input(drive.input);
+    try {
+      open_input(drive.input);
+    } catch (const recording::LogError& error) {
+      throw ConfigError(error.what());  // one of the arguments, found before the first drive
+    }
   }
   return drives;
 }

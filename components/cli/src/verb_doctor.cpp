@@ -8,6 +8,7 @@
 #include "gps_filter_check.hpp"
 #include "input.hpp"
 #include "measurement_checks.hpp"
+#include "number_checks.hpp"
 #include "progress.hpp"
 #include "verbs.hpp"
 
@@ -201,7 +202,7 @@ void add_doctor(CLI::App& app, Chosen& chosen) {
   add_config_options(*verb, options->input);
   verb->add_option("--seconds", options->seconds, "listen to the bus for this long")
       ->capture_default_str()
-      ->check(CLI::PositiveNumber);
+      ->check(more_than_zero());
   verb->add_flag("--gps-filter",
                  options->gps_filter,
                  "hold the GPS filter that runs on the bus against its contract, on a simulated "

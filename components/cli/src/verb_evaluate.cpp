@@ -101,7 +101,10 @@ int run(EvaluateOptions options) {
       std::cout << picture << "\n";
     }
   }
-  return 0;
+  for (const std::string& file : comparison.damaged) {
+    std::cerr << "trigpoint evaluate: left out, " << file << "\n";
+  }
+  return comparison.damaged.empty() ? 0 : 1;
 }
 
 }  // namespace

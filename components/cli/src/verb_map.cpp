@@ -95,8 +95,12 @@ int exit_code_of(const pipeline::MapLogResult& result) {
     return kInterrupted;
   }
   if (result.sweeps_used == 0) {
-    std::cerr << "trigpoint map: none of " << result.sweeps_in_log
-              << " sweeps could be used; the warnings above say why\n";
+    std::cerr << "trigpoint map: "
+              << (result.sweeps_in_log == 0
+                      ? std::string("no sweep is in the part of the log that was used")
+                      : "none of " + std::to_string(result.sweeps_in_log) +
+                            " sweeps could be used; the warnings above say why")
+              << "\n";
     return 1;
   }
   return 0;

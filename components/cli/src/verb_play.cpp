@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
+#include "trigpoint/base/config.hpp"
 #include "trigpoint/export/session.hpp"
 #include "trigpoint/pipeline/session_parts.hpp"
 #include "trigpoint/shell/shell.hpp"
@@ -15,6 +16,7 @@
 #include "verbs.hpp"
 
 #include <chrono>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -107,6 +109,17 @@ int guard_bus(const PlayVerbOptions& options, const SystemConfig& config) {
   return 0;
 }
 
+/// The folder may hold the other processes' parts, but not another player's.
+void refuse_played_session(const std::string& folder) {
+  namespace file = exporter::session_file;
+  for (const char* name : {file::kRun, file::kFixes}) {
+    if (!folder.empty() && std::filesystem::exists(exporter::path_in(folder, name))) {
+      throw ConfigError("--session: " + folder + " holds a player's results already (" + name +
+                        "); name another folder, or remove it");
+    }
+  }
+}
+
 int exit_code_of(const recording::PlayResult& result, bool disk_failed) {
   if (!result.log_error.empty()) {
     std::cerr << "trigpoint play: the log breaks off: " << result.log_error << "\n";
@@ -124,6 +137,7 @@ int run(const PlayVerbOptions& options) {
   if (options.check) {
     return guard_bus(options, open_input(options.input).config);
   }
+  refuse_played_session(options.session);
   const shell::StopSignal stop;
   const shell::EventLog log("play");
   const std::string truth =

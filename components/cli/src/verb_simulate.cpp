@@ -58,6 +58,20 @@ void simulate(const SimulateOptions& options,
   }
 }
 
+/// For a command that is to be copied into a shell.
+std::string as_shell_word(const std::string& text) {
+  constexpr const char* kPlain =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-+=./:,@%";
+  if (text.find_first_not_of(kPlain) == std::string::npos) {
+    return text;
+  }
+  std::string word = "'";
+  for (const char c : text) {
+    word += c == '\'' ? "'\\''" : std::string(1, c);
+  }
+  return word + "'";
+}
+
 int run(const SimulateOptions& options) {
   require_scenario(options.scenario);
   const simulator::Scenario scenario =
@@ -75,7 +89,7 @@ int run(const SimulateOptions& options) {
   std::cout << options.out << ": log (rosbag2, "
             << (options.storage == recording::Storage::kMcap ? "mcap" : "sqlite3")
             << "), truth.tum, scenario.yaml, robot.yaml\n"
-            << "next: trigpoint map " << options.out << " --out SESSION\n";
+            << "next: trigpoint map " << as_shell_word(options.out) << " --out SESSION\n";
   return 0;
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
+#include "trigpoint/base/config.hpp"
 #include "trigpoint/evaluation/comparison.hpp"
 #include "trigpoint/export/trajectory_formats.hpp"
 
@@ -79,9 +80,14 @@ void check_indices(const ComparisonInput& input, const PoseFile* estimate, const
                            "beside them only two of equal length can be compared");
 }
 
-std::vector<Estimate> estimates_of(const SessionData& session) {
+/// What a session should have and cannot give is told.
+std::vector<Estimate> estimates_of(const SessionData& session, Comparison& comparison) {
   std::vector<Estimate> estimates;
   const auto add = [&](const char* name, const Trajectory& trajectory, bool is_in_map) {
+    if (trajectory.empty() && std::string(name) != file::kFusedSmoothed) {
+      comparison.remarks.push_back(std::string("No error of ") + name +
+                                   ": the session has no pose of it.");
+    }
     if (!trajectory.empty()) {
       estimates.push_back({name, trajectory, is_in_map, std::nullopt});
     }
@@ -165,14 +171,9 @@ Compared compare(const Estimate& estimate,
   return compared;
 }
 
-/// A file of the session that cannot be read must not be missing in silence.
-void add_problems(const SessionData& session, Comparison& comparison) {
-  auto& remarks = comparison.remarks;
-  for (const std::string& problem : session.problems) {
-    if (std::find(remarks.begin(), remarks.end(), problem) == remarks.end()) {
-      remarks.push_back(problem);
-    }
-  }
+void note_damaged(const SessionData& session, Comparison& comparison) {
+  comparison.damaged.insert(
+      comparison.damaged.end(), session.damaged.begin(), session.damaged.end());
 }
 
 /// What is to be compared, read.
@@ -188,16 +189,16 @@ Sides read_sides(const ComparisonInput& input, Comparison& comparison) {
   const std::string reference = input.reference.empty() ? input.estimate : input.reference;
   const bool reference_is_session = fs::is_directory(reference);
   if (!estimate_is_session && input.reference.empty()) {
-    throw std::runtime_error(input.estimate +
-                             ": a file needs a reference to be compared with; a session folder "
-                             "brings its own");
+    throw ConfigError(input.estimate +
+                      ": a file needs a reference to be compared with; a session folder brings its "
+                      "own");
   }
   std::optional<PoseFile> estimate_file;
   if (estimate_is_session) {
     const SessionData session = load_session(input.estimate, {});
-    add_problems(session, comparison);
-    sides.estimates = estimates_of(session);
+    sides.estimates = estimates_of(session, comparison);
     sides.outages = session.outages();
+    note_damaged(session, comparison);
   } else {
     estimate_file = read_poses(input.estimate);
     sides.estimates.push_back({input.estimate, estimate_file->trajectory, true, std::nullopt});
@@ -214,9 +215,11 @@ Sides read_sides(const ComparisonInput& input, Comparison& comparison) {
                 reference_file ? &*reference_file : nullptr);
   if (reference_is_session) {
     const SessionData session = load_session(reference, {});
-    add_problems(session, comparison);
     sides.references = references_of(session, comparison);
     sides.outages = session.outages();
+    if (reference != input.estimate) {
+      note_damaged(session, comparison);
+    }
   } else {
     sides.references.push_back({reference, "", ReferenceKind::kPoses, reference_file->trajectory});
   }
@@ -288,8 +291,10 @@ Comparison compare(const ComparisonInput& input) {
   }
   if (comparison.blocks.empty() && !input.may_be_empty) {
     std::string reasons;
-    for (const std::string& remark : comparison.remarks) {
-      reasons += (reasons.empty() ? "" : " ") + remark;
+    for (const auto* list : {&comparison.damaged, &comparison.remarks}) {
+      for (const std::string& reason : *list) {
+        reasons += (reasons.empty() ? "" : " ") + reason;
+      }
     }
     throw std::runtime_error("there is nothing to compare: " + reasons);
   }

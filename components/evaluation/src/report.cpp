@@ -136,7 +136,10 @@ ReportResult write_report(const std::string& session_folder, const ReportOptions
   }
   const PointCloud& shown = map_under(data, map);
   const Accounting found = account(data);
-  result.failures = find_failures(data, found);
+  result.failures = options.failures;
+  for (std::string& failure : find_failures(data, found)) {
+    result.failures.push_back(std::move(failure));
+  }
   if (options.pictures) {
     draw_all(data, shown, options, result);
   }

@@ -40,7 +40,10 @@ void load(SessionData& data, const std::string& name, Need need, const Read& rea
   try {
     read(path);
   } catch (const std::exception& error) {
-    data.problems.push_back(std::string(error.what()) + ".");
+    const std::string cause = error.what();
+    const bool is_named = cause.find(path) != std::string::npos;
+    data.damaged.push_back((is_named ? "" : path + ": ") + cause + ".");
+    data.problems.push_back(data.damaged.back());
   }
 }
 
@@ -98,7 +101,8 @@ void load_records(SessionData& data) {
   load(data, file::kDatum, Need::kOptional, [&](const auto& path) {
     data.datum = exporter::read_datum(path);
   });
-  if (!fs::exists(data.path(file::kDatum))) {
+  const bool needs_none = data.run && data.run->mode == "lio" && data.fixes.empty();
+  if (!needs_none && !fs::exists(data.path(file::kDatum))) {
     data.problems.push_back(why_no_datum(data));
   }
   load(data, file::kAlignment, Need::kOptional, [&](const auto& path) {

@@ -54,14 +54,8 @@ void write_keyframes(const std::string& file,
   }
 }
 
-}  // namespace
-
-PastSettings past_settings_of(const std::string& session) {
+PastSettings read_past_settings(const std::string& file) {
   PastSettings settings;
-  const std::string file = path_in(session, session_file::kConfig);
-  if (!fs::exists(file)) {
-    return settings;
-  }
   const YAML::Node config = YAML::LoadFile(file);
   if (const YAML::Node mapper = config["lio_mapper"]; mapper && mapper["drift"]) {
     const YAML::Node drift = mapper["drift"];
@@ -79,6 +73,20 @@ PastSettings past_settings_of(const std::string& session) {
     }
   }
   return settings;
+}
+
+}  // namespace
+
+PastSettings past_settings_of(const std::string& session) {
+  const std::string file = path_in(session, session_file::kConfig);
+  if (!fs::exists(file)) {
+    return {};
+  }
+  try {
+    return read_past_settings(file);
+  } catch (const YAML::Exception& error) {
+    throw std::runtime_error(file + ": not the configuration of a run: " + error.what());
+  }
 }
 
 GraphInput graph_input_of(const std::string& session) {

@@ -8,6 +8,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <fstream>
 #include <iterator>
 #include <sstream>
@@ -65,6 +66,18 @@ void CsvLine::separate() {
   }
 }
 
+std::string shown(const std::string& text) {
+  constexpr std::size_t kLongest = 80;
+  std::string result;
+  for (const char c : text.substr(0, kLongest)) {
+    const auto byte = static_cast<unsigned char>(c);
+    std::array<char, 5> code{};
+    std::snprintf(code.data(), code.size(), "\\x%02X", byte);
+    result += byte >= 0x20 && byte < 0x7F ? std::string(1, c) : std::string(code.data());
+  }
+  return text.size() > kLongest ? result + "..." : result;
+}
+
 CsvLine& CsvLine::add(const std::string& text) {
   separate();
   std::string cell = text;
@@ -117,7 +130,7 @@ CsvCells::CsvCells(const std::string& place,
 }
 
 void CsvCells::fail(const std::string& expected) const {
-  throw std::runtime_error(place_ + ": column " + columns_[next_] + " is '" + cells_[next_] +
+  throw std::runtime_error(place_ + ": column " + columns_[next_] + " is '" + shown(cells_[next_]) +
                            "', expected " + expected);
 }
 
@@ -214,7 +227,7 @@ void read_csv(const std::string& file,
     throw std::runtime_error(file + ": is empty, expected the header '" + header + "'");
   }
   if (lines.front() != header) {
-    throw std::runtime_error(file + ":1: is '" + lines.front() + "', expected the header '" +
+    throw std::runtime_error(file + ":1: is '" + shown(lines.front()) + "', expected the header '" +
                              header + "'");
   }
   const auto columns = split_line(header);

@@ -13,6 +13,10 @@
 
 namespace trigpoint::exporter {
 
+/// A file's own text for an error: what is no printable ASCII as \xNN, the rest of a long one left
+/// out. A file may hold anything, also what a terminal obeys.
+std::string shown(const std::string& text);
+
 /// One line in the making.
 class CsvLine {
  public:

@@ -101,6 +101,9 @@ void check(const Work& work) {
   if (fs::exists(work.out) && fs::equivalent(work.session, work.out)) {
     throw ConfigError(work.out + ": is the session itself, choose another folder");
   }
+  if (fs::exists(work.out) && !fs::is_directory(work.out)) {
+    throw ConfigError(work.out + ": is no folder, choose another name");
+  }
   check_for_results(work.session);
 }
 

@@ -45,7 +45,8 @@ std::vector<Line> lines_of(const std::string& file) {
 double number_of(const Line& line, std::size_t column) {
   double value = 0.0;
   if (!parse_number(line.words[column], value) || !std::isfinite(value)) {
-    throw std::runtime_error(line.place + ": '" + line.words[column] + "' is not a finite number");
+    throw std::runtime_error(line.place + ": '" + shown(line.words[column]) +
+                             "' is not a finite number");
   }
   return value;
 }
@@ -71,7 +72,7 @@ Pose pose_of(const Line& line) {
 Nanoseconds stamp_of(const Line& line) {
   Nanoseconds stamp_ns = 0;
   if (!parse_stamp(line.words.front(), stamp_ns)) {
-    throw std::runtime_error(line.place + ": '" + line.words.front() +
+    throw std::runtime_error(line.place + ": '" + shown(line.words.front()) +
                              "' is not a time in seconds");
   }
   return stamp_ns;

@@ -50,13 +50,18 @@ Pose between(const Datum& first, const Datum& second) {
   return {Eigen::Quaterniond(Eigen::Matrix3d(svd.matrixU() * svd.matrixV().transpose())), origin_m};
 }
 
-CorrectedPoses poses_of(const GraphInput& input, const lio_mapper::CorrectedPast& past) {
+/// `sessions` names both in an error.
+CorrectedPoses poses_of(const GraphInput& input,
+                        const lio_mapper::CorrectedPast& past,
+                        const std::string& sessions) {
   CorrectedPoses poses;
   poses.frame = past.frame;
   for (std::size_t i = 0; i < input.keyframes.size(); ++i) {
     if (past.T_map_base[i] &&
         !poses.T_frame_base.emplace(input.keyframes[i].stamp_ns, *past.T_map_base[i]).second) {
-      throw std::runtime_error("the two sessions have keyframes of the same time");
+      throw std::runtime_error(sessions + ": both have a keyframe at " +
+                               std::to_string(input.keyframes[i].stamp_ns) +
+                               " ns; two drives at different times are expected, not one twice");
     }
   }
   return poses;
@@ -97,7 +102,7 @@ MergeReport merge_sessions(const std::string& first,
           progress(0.5 * share);
         }
       });
-  const CorrectedPoses poses = poses_of(input, past);
+  const CorrectedPoses poses = poses_of(input, past, first + " and " + second);
   create_session_folder(out);
   write_datum(path_in(out, session_file::kDatum), datum);
   const std::vector<lio_mapper::MapSample> samples = lio_mapper::corrected_trajectory(input, past);

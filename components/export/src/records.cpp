@@ -108,8 +108,8 @@ void create_session_folder(const std::string& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error || !fs::is_directory(folder)) {
-    throw std::runtime_error(folder + ": cannot create the session folder: " +
-                             (error ? error.message() : "it is a file"));
+    throw std::runtime_error(
+        folder + ": cannot create the folder: " + (error ? error.message() : "it is a file"));
   }
 }
 

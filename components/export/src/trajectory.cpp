@@ -34,12 +34,12 @@ StampedPose parse_pose(const std::string& place, const std::string& line) {
   }
   StampedPose result;
   if (!parse_stamp(words[0], result.stamp_ns)) {
-    fail(place, "'" + words[0] + "' is not a time in seconds");
+    fail(place, "'" + shown(words[0]) + "' is not a time in seconds");
   }
   std::array<double, 7> v{};
   for (std::size_t i = 0; i < v.size(); ++i) {
     if (!parse_number(words[i + 1], v[i]) || !std::isfinite(v[i])) {
-      fail(place, "'" + words[i + 1] + "' is not a finite number");
+      fail(place, "'" + shown(words[i + 1]) + "' is not a finite number");
     }
   }
   result.pose.p = {v[0], v[1], v[2]};

@@ -5,6 +5,8 @@
 
 #include "point_codec.hpp"
 #include "store_format.hpp"
+#include <fcntl.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,6 +16,8 @@ namespace trigpoint::lio_mapper {
 
 namespace {
 
+namespace fs = std::filesystem;
+
 constexpr const char* kColumns =
     "SELECT id, stamp_ns, odom_epoch, T_odom_base, pose_covariance, aligned, T_map_odom, "
     "points_base FROM keyframes ";
@@ -21,11 +25,33 @@ constexpr const char* kColumns =
 /// A blob that nobody asks for stays on the disk.
 enum class Clouds { kRead, kLeave };
 
+bool may_write(const fs::path& path) {
+  return ::faccessat(AT_FDCWD, path.c_str(), W_OK, AT_EACCESS) == 0;
+}
+
+/// SQLite reads a store with a write-ahead log only where it may make files beside it; one that
+/// nobody can have open for writing it reads as it is.
+std::string uri_of_unchanging(const std::string& file) {
+  std::string uri = "file:";
+  for (const char c : fs::absolute(file).string()) {
+    uri += c == '%' ? "%25" : c == '?' ? "%3f" : c == '#' ? "%23" : std::string(1, c);
+  }
+  return uri + "?immutable=1";
+}
+
+/// Also on a disk that is read-only, or of another user.
 Database opened(const std::string& file) {
-  if (!std::filesystem::exists(file)) {
+  if (!fs::exists(file)) {
     throw std::runtime_error(file + ": keyframe store: no such file");
   }
-  return {file, SQLITE_OPEN_READWRITE};
+  if (may_write(file) && may_write(fs::absolute(file).parent_path())) {
+    return {file, SQLITE_OPEN_READWRITE};
+  }
+  const std::string log = file + "-wal";
+  if (fs::exists(log) && fs::file_size(log) > 0) {
+    return {file, SQLITE_OPEN_READONLY};  // somebody writes, or was killed while writing
+  }
+  return {file, SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, uri_of_unchanging(file)};
 }
 
 PointCloud raw_points(const Statement& row, int column) {

@@ -14,8 +14,10 @@ namespace trigpoint::lio_mapper {
 
 class Database {
  public:
-  Database(const std::string& file, int flags) : file_(file) {
-    const int code = sqlite3_open_v2(file.c_str(), &handle_, flags, nullptr);
+  /// `name` is what SQLite is given, when that is more than the file (a URI).
+  Database(const std::string& file, int flags, const std::string& name = "") : file_(file) {
+    const int code =
+        sqlite3_open_v2((name.empty() ? file : name).c_str(), &handle_, flags, nullptr);
     if (code != SQLITE_OK) {
       const std::string cause = handle_ != nullptr ? sqlite3_errmsg(handle_) : sqlite3_errstr(code);
       sqlite3_close(handle_);

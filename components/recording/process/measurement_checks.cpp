@@ -2,10 +2,14 @@
 // Copyright the Trigpoint developers
 #include "measurement_checks.hpp"
 
+#include "trigpoint/base/sentence.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
+#include <optional>
 
 namespace trigpoint::recording {
 
@@ -15,6 +19,7 @@ constexpr double kGravity_mps2 = 9.81;
 constexpr double kGravityTolerance_mps2 = 2.0;
 constexpr double kFastestRobot_radps = 12.0;  ///< more is most likely degrees per second
 constexpr std::uint64_t kEnoughImuSamples = 50;
+constexpr double kFarthestMedian_m = 300.0;  ///< more is most likely millimetres
 
 std::string number(double value) {
   std::array<char, 32> text{};
@@ -32,6 +37,48 @@ bool has_field(const PointCloudMessage& cloud, const std::vector<std::string>& n
   return std::any_of(cloud.fields.begin(), cloud.fields.end(), [&names](const PointField& field) {
     return std::find(names.begin(), names.end(), field.name) != names.end();
   });
+}
+
+/// Where a cloud has x, y and z as float32, as the mapper takes them; -1 where not.
+std::array<std::int64_t, 3> offsets_of_xyz(const PointCloudMessage& cloud) {
+  constexpr std::uint8_t kFloat32 = 7;
+  std::array<std::int64_t, 3> offsets{-1, -1, -1};
+  for (const PointField& field : cloud.fields) {
+    const std::size_t axis = std::string("xyz").find(field.name);
+    if (field.name.size() == 1 && axis != std::string::npos && field.datatype == kFloat32) {
+      offsets[axis] = field.offset;
+    }
+  }
+  return offsets;
+}
+
+/// Of some hundred points; nothing where none has returned, or the cloud is not as the mapper takes
+/// it.
+std::optional<double> median_range_m(const PointCloudMessage& cloud) {
+  constexpr std::size_t kLooks = 500;
+  const auto offsets = offsets_of_xyz(cloud);
+  const auto [first, last] = std::minmax_element(offsets.begin(), offsets.end());
+  const std::size_t points = cloud.point_step > 0 ? cloud.data.size() / cloud.point_step : 0;
+  if (*first < 0 || *last + 4 > cloud.point_step || cloud.is_bigendian) {
+    return std::nullopt;
+  }
+  std::vector<double> ranges_m;
+  for (std::size_t i = 0; i < points; i += points / kLooks + 1) {
+    Eigen::Vector3f p;
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      const auto offset = static_cast<std::size_t>(offsets[static_cast<std::size_t>(axis)]);
+      std::memcpy(&p[axis], cloud.data.data() + i * cloud.point_step + offset, sizeof(float));
+    }
+    if (p.allFinite() && !p.isZero(0.0F)) {
+      ranges_m.push_back(p.cast<double>().norm());
+    }
+  }
+  if (ranges_m.empty()) {
+    return std::nullopt;
+  }
+  const auto middle = ranges_m.begin() + static_cast<std::ptrdiff_t>(ranges_m.size() / 2);
+  std::nth_element(ranges_m.begin(), middle, ranges_m.end());
+  return *middle;
 }
 
 }  // namespace
@@ -86,6 +133,10 @@ void MeasurementChecks::take(const PointCloudMessage& cloud) {
         "the points carry no time (no field time, t or timestamp): set lio_mapper.sweep.point_time "
         "to azimuth or snapshot");
   }
+  if (const auto range_m = median_range_m(cloud); range_m && origin_ == Origin::kSensor) {
+    ++clouds_with_ranges_;
+    range_sum_m_ += *range_m;
+  }
 }
 
 void MeasurementChecks::take(const Odometry& odometry) {
@@ -110,6 +161,13 @@ std::vector<std::string> MeasurementChecks::remarks() const {
   std::vector<std::string> all;
   for (const auto& [sentence, count] : notes_) {
     all.push_back(sentence + " (" + std::to_string(count) + " times)");
+  }
+  const double range_m =
+      clouds_with_ranges_ > 0 ? range_sum_m_ / static_cast<double>(clouds_with_ranges_) : 0.0;
+  if (range_m > kFarthestMedian_m) {
+    all.push_back(
+        sentence("half of the points are farther than %.0f: are they in millimetres? m is expected",
+                 range_m));
   }
   if (imu_samples_ < kEnoughImuSamples) {
     return all;

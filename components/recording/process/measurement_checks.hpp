@@ -41,6 +41,8 @@ class MeasurementChecks {
   double accel_sum_mps2_{0.0};
   double accel_z_sum_mps2_{0.0};
   double gyro_peak_radps_{0.0};
+  std::uint64_t clouds_with_ranges_{0};
+  double range_sum_m_{0.0};  ///< of the clouds' median ranges
 };
 
 }  // namespace trigpoint::recording

@@ -2,6 +2,9 @@
 // Copyright the Trigpoint developers
 #include "log_window.hpp"
 
+#include "trigpoint/base/config.hpp"
+#include "trigpoint/base/sentence.hpp"
+
 #include <algorithm>
 #include <cmath>
 
@@ -36,14 +39,30 @@ class FixRateLimit {
   std::int64_t last_slot_{-1};
 };
 
+/// Throws ConfigError when nothing of the log would be left.
+Nanoseconds begin_of(const LogSummary& log, double start_s) {
+  const double lasts_s = to_seconds(log.last_ns - log.first_ns);
+  if (start_s > 0.0 && start_s >= lasts_s) {
+    throw ConfigError(log.path + sentence(": lasts %g s, log.start_s skips %g s: nothing is left",
+                                          lasts_s,
+                                          start_s));
+  }
+  return log.first_ns + from_seconds(start_s);
+}
+
+/// However long a duration is (it need not fit into nanoseconds), the log's end ends it.
+Nanoseconds end_of(const LogSummary& log, Nanoseconds begin_ns, double duration_s) {
+  const bool is_within = duration_s > 0.0 && duration_s < to_seconds(log.last_ns - begin_ns);
+  return is_within ? begin_ns + from_seconds(duration_s) : log.last_ns;
+}
+
 class LogWindow : public LogReader {
  public:
   LogWindow(std::unique_ptr<LogReader> log, const LogOptions& options)
       : log_(std::move(log)),
         limit_(options.fix_rate_limit_hz),
-        begin_ns_(log_->summary().first_ns + from_seconds(options.start_s)),
-        end_ns_(options.duration_s > 0.0 ? begin_ns_ + from_seconds(options.duration_s)
-                                         : log_->summary().last_ns) {}
+        begin_ns_(begin_of(log_->summary(), options.start_s)),
+        end_ns_(end_of(log_->summary(), begin_ns_, options.duration_s)) {}
 
   const LogSummary& summary() const override { return log_->summary(); }
 

@@ -9,7 +9,11 @@
 #include "mcap_file.hpp"
 #include "rosbag1_source.hpp"
 #include "rosbag2_source.hpp"
+#include <fcntl.h>
+#include <unistd.h>
 
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <string_view>
@@ -71,6 +75,9 @@ std::unique_ptr<LogReader> open_log(const std::string& path,
                                     const LogOptions& options) {
   if (!fs::exists(path)) {
     throw LogError(path + ": does not exist");
+  }
+  if (fs::is_directory(path) && ::faccessat(AT_FDCWD, path.c_str(), R_OK | X_OK, AT_EACCESS) != 0) {
+    throw LogError(path + ": cannot be read: " + std::strerror(errno));
   }
   return apply_options(open_by_kind(path, robot, options), options);
 }

@@ -84,6 +84,9 @@ std::vector<std::string> parts_of(const std::string& composed) {
   if (fs::is_regular_file(composed, ignored)) {
     return {composed};
   }
+  if (composed.ends_with('+')) {
+    throw ConfigError(composed + ": ends with +, a change is expected after it");
+  }
   std::vector<std::string> parts;
   std::stringstream text(composed);
   for (std::string part; std::getline(text, part, '+');) {

@@ -159,5 +159,12 @@ TEST(Config, a_folder_in_place_of_a_file_is_named) {
   }
 }
 
+TEST(Config, a_second_document_is_refused_since_its_keys_would_count_for_nothing) {
+  EXPECT_THAT(error_of("sample: {count: 2}\n---\nsample: {count: 3}\n"),
+              HasSubstr("file.yaml:3: a second document"));
+  EXPECT_EQ(error_of("---\nsample: {count: 2}\n"), "no error");
+  EXPECT_EQ(error_of(""), "no error");
+}
+
 }  // namespace
 }  // namespace trigpoint

@@ -55,6 +55,10 @@ TEST(InputArguments, without_a_log_or_with_a_wrong_number_are_a_usage_error) {
     EXPECT_THROW(parse(std::string("drive.bag --duration ") + wrong), CLI::ValidationError)
         << wrong;
   }
+  for (const char* wrong : {"-1", "nan", "inf", "far"}) {
+    EXPECT_THROW(parse(std::string("short --start ") + wrong), CLI::ValidationError) << wrong;
+  }
+  EXPECT_EQ(parse("short --start 0").changes.start_m, 0.0);
   for (const char* wrong : {"-1", "1.5", "1e23", "99999999999999999999"}) {
     EXPECT_THROW(parse(std::string("drive.bag --seed ") + wrong), CLI::ValidationError) << wrong;
   }
@@ -143,7 +147,8 @@ TEST(Input, takes_a_simulated_drives_folder_or_the_log_within_it) {
   const ScratchFolder folder;
   const auto scenario = simulator::load_scenario("short");
   simulator::simulate(scenario, 1, 0.5, folder.path());
-  for (const std::string& path : {folder.path(), folder.file("log"), folder.file("log/")}) {
+  for (const std::string& path :
+       {folder.path(), folder.file("log"), folder.file("log/"), folder.file("log/log_0.db3")}) {
     const Input input = open_input(of(path));
     EXPECT_EQ(input.config.cores.robot.antenna_position_base_m,
               scenario.robot.antenna_position_base_m)
@@ -165,6 +170,26 @@ TEST(Input, that_lacks_a_topic_is_refused_unless_it_may) {
   EXPECT_THAT(error_of([&] { open_input(options); }), HasSubstr("points"));
   options.lenient = true;
   EXPECT_EQ(error_of([&] { open_input(options); }), "");
+}
+
+TEST(Input, of_a_topic_that_the_user_named_wrongly_is_a_matter_of_configuration) {
+  const ScratchFolder folder;
+  simulator::simulate(simulator::load_scenario("short"), 1, 0.5, folder.file("drive"));
+  for (const std::string& topic : {std::string("lidar"), std::string("imu/data")}) {
+    test::write_all(folder.file("mine.yaml"), "robot: {points_topic: " + topic + "}\n");
+    InputOptions options = of(folder.file("drive"));
+    options.config_files = {folder.file("mine.yaml")};
+    try {
+      open_input(options);
+      FAIL() << topic << " was accepted";
+    } catch (const ConfigError& error) {
+      EXPECT_THAT(error.what(), AllOf(HasSubstr(topic), HasSubstr("robot.points_topic")));
+    }
+  }
+}
+
+TEST(Input, of_a_scenario_that_ends_with_a_plus_lacks_its_change) {
+  EXPECT_THAT(error_of([] { open_input(of("short+")); }), HasSubstr("short+: ends with +"));
 }
 
 }  // namespace

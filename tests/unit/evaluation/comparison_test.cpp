@@ -2,13 +2,14 @@
 // Copyright the Trigpoint developers
 #include "trigpoint/evaluation/comparison.hpp"
 
+#include "trigpoint/base/config.hpp"
+
 #include "made_session.hpp"
 #include "made_trajectories.hpp"
 #include "run_command.hpp"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <filesystem>
 
 namespace trigpoint::evaluation {
@@ -68,19 +69,6 @@ TEST(Comparison, takes_a_session_as_the_reference_of_a_file_with_its_lever_arm_a
               whole.blocks[i].compared[0].evaluation.scores[0].error.position_m.rmse);
   }
   EXPECT_EQ(file.blocks[0].compared[0].evaluation.outages.size(), 1U);
-}
-
-TEST(Comparison, of_a_session_names_once_what_could_not_be_read) {
-  const TemporaryFolder folder;
-  test::make_session(folder.path("s"));
-  tests::write_file(folder.path("s/fused.tum"), "1.0 no pose\n");
-  const Comparison comparison = compare({folder.path("s"), "", "", ""});
-  EXPECT_THAT(names_of(comparison.blocks.at(0)), testing::Not(Contains("fused.tum")));
-  EXPECT_EQ(std::count_if(comparison.remarks.begin(),
-                          comparison.remarks.end(),
-                          [](const auto& r) { return r.find("fused.tum:1") != std::string::npos; }),
-            1);
-  EXPECT_THAT(print(comparison), HasSubstr("fused.tum:1"));
 }
 
 TEST(Comparison, takes_the_same_gap_for_fixes_as_for_poses) {
@@ -180,6 +168,26 @@ TEST(Comparison, is_drawn_for_each_reference) {
   for (const std::string& picture : pictures) {
     EXPECT_GT(std::filesystem::file_size(picture), 5000U) << picture;
   }
+}
+
+TEST(Comparison, of_a_session_names_what_it_left_out) {
+  const TemporaryFolder folder;
+  test::make_session(folder.path("s"));
+  tests::write_file(folder.path("s") + "/fused.tum", "nonsense\n");
+  tests::write_file(folder.path("s") + "/config.yaml", "robot: [1\n");
+  std::filesystem::remove(folder.path("s") + "/gps.tum");
+  const Comparison comparison = compare({folder.path("s"), "", "", ""});
+  EXPECT_THAT(comparison.damaged,
+              testing::UnorderedElementsAre(HasSubstr("fused.tum:1"), HasSubstr("config.yaml: ")));
+  EXPECT_THAT(comparison.remarks,
+              AllOf(Contains(HasSubstr("No error of fused.tum")),
+                    Contains(HasSubstr("No error of gps.tum"))));
+}
+
+TEST(Comparison, of_a_file_with_nothing_is_wrong_usage) {
+  const TemporaryFolder folder;
+  test::make_session(folder.path("s"));
+  EXPECT_THROW(compare({folder.path("s") + "/fused.tum", "", "", ""}), ConfigError);
 }
 
 }  // namespace

@@ -273,6 +273,16 @@ TEST(Report, goes_on_with_the_rest_when_a_file_is_damaged_or_missing) {
   EXPECT_THAT(result.text, AllOf(HasSubstr("gate.csv:1"), HasSubstr("| fused.tum")));
 }
 
+TEST(Report, begins_with_what_failed_before_it) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  ReportOptions options = kNoPictures;
+  options.failures = {"The map was not rendered: too little disk."};
+  const auto result = write_report(folder.path(), options);
+  EXPECT_THAT(result.failures, testing::ElementsAre(options.failures.front()));
+  EXPECT_THAT(result.text, HasSubstr(options.failures.front()));
+}
+
 TEST(Report, of_a_session_without_results_is_written_and_incomplete) {
   const ScratchFolder folder;
   write_all(folder.file("config.yaml"), "robot:\n  antenna_position_base_m: [0, 0, 0]\n");
@@ -424,6 +434,19 @@ TEST(Report, fails_without_an_admitted_alignment_but_in_mode_lio) {
   run.mode = "lio";
   exporter::write_run(folder.file("run.yaml"), run);
   EXPECT_THAT(write_report(folder.path(), kNoPictures).failures, IsEmpty());
+}
+
+TEST(Report, of_mode_lio_without_fixes_misses_no_datum) {
+  const ScratchFolder folder;
+  make_session(folder.path());
+  std::filesystem::remove(folder.file("datum.yaml"));
+  const auto fixes = read_all(folder.file("fixes.csv"));
+  write_all(folder.file("fixes.csv"), fixes.substr(0, fixes.find('\n') + 1));
+  EXPECT_THAT(write_report(folder.path(), kNoPictures).problems, Contains(HasSubstr("no datum")));
+  auto run = exporter::read_run(folder.file("run.yaml"));
+  run.mode = "lio";
+  exporter::write_run(folder.file("run.yaml"), run);
+  EXPECT_THAT(write_report(folder.path(), kNoPictures).problems, IsEmpty());
 }
 
 TEST(Report, fails_when_nothing_was_published_in_map) {

@@ -2,6 +2,8 @@
 // Copyright the Trigpoint developers
 #include "trigpoint/export/export_session.hpp"
 
+#include "trigpoint/base/config.hpp"
+#include "trigpoint/export/correct_session.hpp"
 #include "trigpoint/export/session.hpp"
 #include "trigpoint/lio_mapper/keyframe_store.hpp"
 
@@ -40,11 +42,12 @@ class ExportSession : public testing::Test {
     writer.append(2, Pose{});
   }
 
-  /// One point 1 m ahead of the origin of odom, not aligned.
-  void write_keyframe() const {
+  /// One point 1 m ahead of the origin of odom.
+  void write_keyframe(bool aligned = false) const {
     lio_mapper::KeyframeWriter writer(path_in(session(), session_file::kKeyframes));
     lio_mapper::Keyframe keyframe;
     keyframe.stamp_ns = 1;
+    keyframe.aligned = aligned;
     keyframe.points_base = {{1.0F, 0.0F, 0.0F, 7.0F}};
     writer.append(keyframe);
   }
@@ -290,6 +293,31 @@ TEST_F(ExportSession, places_lio_at_the_very_moment_of_the_first_published_pose)
   // 100 m and 101 m at 8.98315e-6 degrees each.
   EXPECT_THAT(text.substr(text.find("\"lio\"")),
               AllOf(HasSubstr("[ 3.000898315"), HasSubstr("[ 3.000907298")));
+}
+
+TEST_F(ExportSession, tells_wrong_options_from_a_failure) {
+  write_lio();
+  export_session(session(), out());
+  ExportOptions small;
+  small.tile_m = 0.5;
+  EXPECT_THROW(export_session(session(), out()), ConfigError) << "is there already";
+  EXPECT_THROW(export_session(session(), out("lio.tum")), ConfigError) << "a file";
+  EXPECT_THROW(export_session(session(), out("tiles"), small), ConfigError);
+  EXPECT_FALSE(std::filesystem::exists(out("tiles")));
+}
+
+TEST_F(ExportSession, names_the_configuration_that_cannot_be_read) {
+  for (const char* text : {"robot: [1, 2\n", "hello\n", "robot: {lidar_position_base_m: [a]}\n"}) {
+    write_all(path_in(session(), session_file::kConfig), text);
+    EXPECT_THAT(error_of([&] { past_settings_of(session()); }), HasSubstr("config.yaml")) << text;
+  }
+}
+
+TEST_F(ExportSession, of_a_drive_twice_is_no_merge_and_both_are_named) {
+  write_keyframe(true);
+  write_datum(path_in(session(), session_file::kDatum), Datum{43.9, -78.9, 100.0});
+  EXPECT_THAT(error_of([&] { merge_sessions(session(), session(), out(), 0.1, {}); }),
+              AllOf(HasSubstr(session() + " and " + session()), HasSubstr("not one twice")));
 }
 
 }  // namespace

@@ -340,5 +340,13 @@ TEST(Session, an_alignment_differs_when_a_map_would_lie_visibly_elsewhere) {
   EXPECT_TRUE(differs_substantially(next, written));
 }
 
+TEST(FixLog, that_holds_anything_shows_it_harmless_and_short) {
+  const ScratchFolder folder;
+  write_all(folder.file("fixes.csv"), "\x1B[2J\xFF" + std::string(500, 'a') + "\n");
+  const std::string error = error_of([&] { read_fixes(folder.file("fixes.csv")); });
+  EXPECT_THAT(error, AllOf(HasSubstr("\\x1B[2J\\xFFaaa"), HasSubstr("aaa...'")));
+  EXPECT_THAT(error, testing::Not(HasSubstr(std::string(100, 'a'))));
+}
+
 }  // namespace
 }  // namespace trigpoint::exporter

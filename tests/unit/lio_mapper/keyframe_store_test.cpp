@@ -12,6 +12,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
@@ -374,6 +375,57 @@ TEST_F(KeyframeStore, refuses_a_pose_that_is_not_finite) {
 TEST_F(KeyframeStore, names_a_folder_that_cannot_be_written) {
   EXPECT_THAT(error_of_writing(folder_ / "missing" / "keyframes.sqlite"),
               HasSubstr("unable to open"));
+}
+
+/// Takes the right to write from a folder and its files, for root too.
+class ReadOnly {
+ public:
+  explicit ReadOnly(const std::filesystem::path& folder) : folder_(folder) {
+    set(0444, 0555);
+    if (geteuid() == 0) {
+      constexpr uid_t kNobody = 65534;
+      is_nobody_ = seteuid(kNobody) == 0;
+    }
+  }
+
+  ~ReadOnly() {
+    if (is_nobody_ && seteuid(0) != 0) {
+      std::abort();
+    }
+    set(0644, 0755);
+  }
+
+  ReadOnly(const ReadOnly&) = delete;
+  ReadOnly& operator=(const ReadOnly&) = delete;
+
+ private:
+  void set(unsigned files, unsigned folder) const {
+    namespace fs = std::filesystem;
+    for (const auto& entry : fs::directory_iterator(folder_)) {
+      fs::permissions(entry.path(), fs::perms{files});
+    }
+    fs::permissions(folder_, fs::perms{folder});
+  }
+
+  std::filesystem::path folder_;
+  bool is_nobody_{false};
+};
+
+TEST_F(KeyframeStore, is_read_where_nobody_may_write) {
+  const std::filesystem::path odd = folder_ / "100%?#";
+  std::filesystem::permissions(folder_, std::filesystem::perms{0755});
+  std::filesystem::create_directory(odd);
+  {
+    KeyframeWriter writer(odd / "keyframes.sqlite");
+    writer.append(keyframe(1));
+  }
+  const ReadOnly read_only(odd);
+  EXPECT_NE(error_of_writing(odd / "keyframes.sqlite"), "");
+  std::vector<Keyframe> read;
+  KeyframeReader(odd / "keyframes.sqlite").visit([&](const Keyframe& k) { read.push_back(k); });
+  ASSERT_EQ(read.size(), 1U);
+  expect_equal(read.front(), keyframe(1));
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(odd), {}), 1) << "nothing is left";
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 // Copyright the Trigpoint developers
 #include "measurement_checks.hpp"
 
+#include "trigpoint/base/point_cloud.hpp"
+
 #include "samples.hpp"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -76,6 +78,7 @@ TEST(MeasurementChecks, tell_an_odometry_without_child_frame_or_with_a_broken_po
 
 TEST(MeasurementChecks, does_not_ask_of_our_own_topics_what_only_sensors_have) {
   PointCloudMessage map = sample_cloud(0);
+  map.data.assign(map.data.size(), 0);
   map.fields.pop_back();
   GnssFix datum = sample_fix(0);
   datum.stamp_ns = 0;
@@ -96,5 +99,41 @@ TEST(MeasurementChecks, does_not_ask_of_our_own_topics_what_only_sensors_have) {
   EXPECT_THAT(of_a_receiver.remarks(), Contains(HasSubstr("nothing of its covariance")));
 }
 
+/// A wall at this range on the left, with a point without a return and one that is none.
+PointCloudMessage cloud_at(float range) {
+  PointCloud points;
+  for (int i = 0; i < 2000; ++i) {
+    points.push_back({0.01F * range * static_cast<float>(i % 10), range, 0.0F, 1.0F});
+  }
+  points[0] = {0.0F, 0.0F, 0.0F, 0.0F};
+  points[1] = {std::numeric_limits<float>::quiet_NaN(), 0.0F, 0.0F, 0.0F};
+  PointCloudMessage cloud = to_cloud_message(points, 1, "lidar");
+  cloud.fields.back().name = "time";
+  return cloud;
+}
+
+TEST(MeasurementChecks, tell_points_in_millimetres_from_those_far_away) {
+  MeasurementChecks far;
+  far.take(cloud_at(150.0F));
+  EXPECT_THAT(far.remarks(), IsEmpty());
+  MeasurementChecks millimetres;
+  millimetres.take(cloud_at(8000.0F));
+  EXPECT_THAT(millimetres.remarks(),
+              testing::ElementsAre(AllOf(HasSubstr("farther than 8"), HasSubstr("millimetres"))));
+  MeasurementChecks map(MeasurementChecks::Origin::kOurs);
+  map.take(cloud_at(8000.0F));
+  EXPECT_THAT(map.remarks(), IsEmpty());
+}
+
+TEST(MeasurementChecks, look_at_no_points_that_a_cloud_does_not_hold) {
+  PointCloudMessage cloud = cloud_at(8000.0F);
+  cloud.point_step = 8;  // z would lie beyond
+  MeasurementChecks checks;
+  checks.take(cloud);
+  cloud = cloud_at(8000.0F);
+  cloud.data.resize(7);
+  checks.take(cloud);
+  EXPECT_THAT(checks.remarks(), IsEmpty());
+}
 }  // namespace
 }  // namespace trigpoint::recording

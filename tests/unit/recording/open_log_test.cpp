@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
+#include "trigpoint/base/config.hpp"
 #include "trigpoint/recording/log.hpp"
 #include "trigpoint/recording/rosbag2_writer.hpp"
 
@@ -7,8 +8,10 @@
 #include "temporary_folder.hpp"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 
 namespace trigpoint::recording {
@@ -282,6 +285,39 @@ TEST_F(OpenLog, finds_the_truth_beside_a_simulated_log) {
             open_log(path + "/", robot())->truth_file().value_or(""));
   EXPECT_EQ((folder_ / "truth.tum").string(),
             open_log(path + "/log_0.db3", robot())->truth_file().value_or(""));
+}
+
+TEST_F(OpenLog, a_duration_beyond_the_log_is_all_of_it_however_long) {
+  const std::string log = recorded();
+  for (const double duration_s : {10.5, 1e300}) {
+    LogOptions options;
+    options.duration_s = duration_s;
+    EXPECT_EQ(1000U, only<ImuSample>(read_all(*open_log(log, robot(), options))).size());
+  }
+}
+
+TEST_F(OpenLog, refuses_to_skip_the_whole_log) {
+  const std::string log = recorded();
+  for (const double start_s : {10.0, 1e300}) {
+    LogOptions options;
+    options.start_s = start_s;
+    EXPECT_THAT(message_of<ConfigError>([&] { open_log(log, robot(), options); }),
+                AllOf(HasSubstr(log), HasSubstr("lasts 9.99 s"), HasSubstr("log.start_s")));
+  }
+}
+
+TEST_F(OpenLog, names_a_folder_that_may_not_be_read) {
+  const std::string log = recorded();
+  namespace fs = std::filesystem;
+  fs::permissions(folder_.path(), fs::perms{0755});
+  fs::permissions(log, fs::perms{0000});
+  const bool is_root = geteuid() == 0;
+  constexpr uid_t kNobody = 65534;
+  ASSERT_TRUE(!is_root || seteuid(kNobody) == 0);
+  const std::string refused = refusal(log, robot());
+  ASSERT_TRUE(!is_root || seteuid(0) == 0);
+  fs::permissions(log, fs::perms{0755});
+  EXPECT_THAT(refused, HasSubstr(log + ": cannot be read: Permission denied"));
 }
 
 }  // namespace

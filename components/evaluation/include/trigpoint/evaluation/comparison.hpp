@@ -41,11 +41,12 @@ struct ComparisonBlock {
 struct Comparison {
   std::vector<ComparisonBlock> blocks;
   std::vector<std::string> remarks;  ///< what could not be compared, and why; a sentence each
+  std::vector<std::string> damaged;  ///< files of a session that cannot be read, and why
   std::optional<MapQuality> map;     ///< filled in by who wants it (map_quality.hpp)
 };
 
 /// Throws std::runtime_error naming file, line and cause, and when nothing has a moment in common
-/// with anything.
+/// with anything; ConfigError for a file without a reference.
 Comparison compare(const ComparisonInput& input);
 
 /// Markdown that also reads well in a terminal.

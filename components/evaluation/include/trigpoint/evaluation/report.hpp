@@ -21,6 +21,9 @@ struct ReportOptions {
   /// config.yaml, else zero, which the report then says.
   std::optional<Eigen::Vector3d> antenna_position_base_m;
   bool page{true};  ///< report.html
+  /// Of what was done with the session before, one sentence each: they stand first among
+  /// `failures`.
+  std::vector<std::string> failures{};
 };
 
 struct ReportResult {

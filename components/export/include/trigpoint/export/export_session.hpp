@@ -46,8 +46,9 @@ struct ExportReport {
 /// only the finished map is there), trajectories are read strictly. What needs a place on the Earth
 /// goes through geodesy::MapOnEarth; without datum.yaml, or where the map is in odom, that is left
 /// out and told. Throws ConfigError, before anything is written, when the session is no folder, a
-/// format is not known (naming those that are) or a file that would be written is there already;
-/// std::runtime_error when a file is damaged or nothing at all could be written.
+/// format is not known (naming those that are), the options cannot be, or a file that would be
+/// written is there already; std::runtime_error when a file is damaged or nothing at all could be
+/// written.
 ExportReport export_session(const std::string& session_folder,
                             const std::string& out_folder,
                             const ExportOptions& options = {},
