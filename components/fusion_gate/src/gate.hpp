@@ -46,6 +46,9 @@ struct FusionGate::Impl {
   };
 
   Told take_records(const GpsStatus& status, const std::optional<GpsStatus>& last, Output& out);
+  void take_back_retold(const Told& told,
+                        std::uint64_t retold,
+                        const std::map<std::string, std::uint64_t>& refusals);
   void settle_others(const GpsStatus& status,
                      const std::optional<GpsStatus>& last,
                      const Told& told);

@@ -134,6 +134,28 @@ FusionGate::Impl::Told FusionGate::Impl::take_records(const GpsStatus& gps,
   return told;
 }
 
+/// `retold` fixes are told of again, now that they have a place in map: what became of them before
+/// is undone. Of `refusals`, by reason, since the status before, nobody has heard yet.
+void FusionGate::Impl::take_back_retold(const Told& told,
+                                        std::uint64_t retold,
+                                        const std::map<std::string, std::uint64_t>& refusals) {
+  for (const auto& [code, count] : told.refused) {
+    const auto is_of_code = [&code = code](const auto& one) {
+      return refused_code(one.first) == code;
+    };
+    const auto of_now = std::find_if(refusals.begin(), refusals.end(), is_of_code);
+    std::uint64_t again =
+        std::min(retold, growth(count, of_now == refusals.end() ? 0 : of_now->second));
+    retold -= again;
+    for (; again > 0; --again) {
+      verdicts.take_back(code);
+    }
+  }
+  for (; retold > 0; --retold) {
+    verdicts.take_back(kBeforeDatum);
+  }
+}
+
 /// Fixes without a record get their verdict here, so that every fix has exactly one: messages that
 /// the filter refused as such, by reason; and of a filter that keeps no records all that it
 /// refused, and what it accepted behind a newer fix.
@@ -151,10 +173,11 @@ void FusionGate::Impl::settle_others(const GpsStatus& gps,
   };
   const std::uint64_t of_now = std::min(open, told.fixes);
   open -= of_now;
-  for (std::uint64_t k = of_now; before.datum_id.empty() && k < told.fixes; ++k) {
-    verdicts.take_back(kBeforeDatum);  // told of again, now that it has a place in map
+  const auto refusals = new_refusals(gps, before);
+  if (before.datum_id.empty()) {
+    take_back_retold(told, told.fixes - of_now, refusals);
   }
-  for (const auto& [reason, count] : new_refusals(gps, before)) {
+  for (const auto& [reason, count] : refusals) {
     const auto recorded = told.refused.find(refused_code(reason));
     settle(growth(count, recorded == told.refused.end() ? 0 : recorded->second),
            refused_code(reason),

@@ -183,6 +183,26 @@ TEST(FusionGateVerdicts, give_a_fix_from_before_the_datum_one_verdict_only) {
   EXPECT_EQ(filter.verdicts(), 3U);
 }
 
+TEST(FusionGateVerdicts, give_a_fix_that_was_refused_before_the_datum_one_verdict_only) {
+  ToldFilter filter;
+  const std::string datum = filter.status().datum_id;
+  filter.status().datum_id.clear();
+  filter.refuses(1000.0, "before_imu");
+  filter.accepts(1000.2);
+  filter.status().datum_id = datum;
+  filter.status().recent_fixes = {record_of(1000.0, "before_imu"), record_of(1000.2)};
+  filter.note("gate");
+  filter.tells_of(record_of(1000.4, "gate"));
+  for (int k = 3; k < 20; ++k) {
+    filter.tells_of(record_of(1000.0 + 0.2 * k));
+    filter.lio_at(1000.0 + 0.2 * k);
+  }
+  EXPECT_EQ(count_of(filter.last(), "refused_by_filter_before_imu"), 1U);
+  EXPECT_EQ(count_of(filter.last(), "refused_by_filter_gate"), 1U);
+  EXPECT_EQ(count_of(filter.last(), "before_datum"), 0U);
+  EXPECT_EQ(filter.verdicts(), filter.last().fixes_seen);
+}
+
 TEST(FusionGateVerdicts, count_fixes_of_which_no_filter_has_told_as_waiting) {
   FusionGate gate{Config{}, RobotConfig{}};
   Odometry lio;
