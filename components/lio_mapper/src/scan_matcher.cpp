@@ -409,8 +409,10 @@ ScanMatcher::Pull ScanMatcher::pull_at(const Viewpoint& view, const Vector3d& ax
       return;
     }
     const double h = r.plane.normal.dot(axis);
+    // Off a wall, as it is displaced, a point has a large residual and is no outlier.
+    const double residual_m = std::exchange(r.residual_m, 0.0);
     weigh(r, (view.R_odom_base * r.direction_base).dot(r.plane.normal));
-    const double pull = r.weight * r.residual_m * h;
+    const double pull = r.weight * residual_m * h;
     const double promised = r.weight * h * h;
     sums[block] += {pull, promised, pull * pull, pull * promised, promised * promised};
   });
