@@ -16,6 +16,9 @@ namespace trigpoint::recording {
 namespace {
 
 constexpr double kGravity_mps2 = 9.81;
+/// Fixes come late and out of order; so far back the GPS filters still take them
+/// (gps_odometry.rewind_s).
+constexpr Nanoseconds kLateFix_ns = 2'500'000'000;
 constexpr double kGravityTolerance_mps2 = 2.0;
 constexpr double kFastestRobot_radps = 12.0;  ///< more is most likely degrees per second
 constexpr std::uint64_t kEnoughImuSamples = 50;
@@ -96,7 +99,7 @@ void MeasurementChecks::take(const ImuSample& sample) {
 }
 
 void MeasurementChecks::take(const GnssFix& fix) {
-  check_stamp(fix.stamp_ns, fix.frame_id);
+  check_stamp(fix.stamp_ns, fix.frame_id, kLateFix_ns);
   if (fix.status == FixStatus::kNoFix) {
     note("no fix (status -1)");
   }
@@ -192,11 +195,15 @@ std::vector<std::string> MeasurementChecks::remarks() const {
   return all;
 }
 
-void MeasurementChecks::check_stamp(Nanoseconds stamp_ns, const std::string& frame_id) {
+/// Stamps of some topics may go back by `allowed_ns`.
+void MeasurementChecks::check_stamp(Nanoseconds stamp_ns,
+                                    const std::string& frame_id,
+                                    Nanoseconds allowed_ns) {
   if (stamp_ns <= 0 && origin_ == Origin::kSensor) {
     note("a stamp of 0");
-  } else if (stamp_ns < newest_ns_) {
-    note("a stamp that goes back");
+  } else if (stamp_ns < newest_ns_ - allowed_ns) {
+    note(allowed_ns > 0 ? "a stamp that goes back farther than late fixes are used"
+                        : "a stamp that goes back");
   }
   newest_ns_ = std::max(newest_ns_, stamp_ns);
   if (frame_id.empty()) {

@@ -32,7 +32,7 @@ class MeasurementChecks {
   std::vector<std::string> remarks() const;
 
  private:
-  void check_stamp(Nanoseconds stamp_ns, const std::string& frame_id);
+  void check_stamp(Nanoseconds stamp_ns, const std::string& frame_id, Nanoseconds allowed_ns = 0);
 
   Origin origin_;
   std::map<std::string, std::uint64_t> notes_;

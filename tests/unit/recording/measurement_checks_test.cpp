@@ -44,6 +44,29 @@ TEST(MeasurementChecks, counts_fixes_whose_position_or_covariance_is_not_finite)
   EXPECT_THAT(checks.remarks(), Contains(HasSubstr("a covariance that is not finite")));
 }
 
+TEST(MeasurementChecks, let_fixes_come_out_of_order_as_far_as_filters_take_them) {
+  MeasurementChecks checks;
+  GnssFix fix = sample_fix(0);
+  const Nanoseconds newest_ns = fix.stamp_ns + 10 * kNanosecondsPerSecond;
+  for (const double back_s : {0.0, 0.4, 2.4}) {
+    fix.stamp_ns = newest_ns - from_seconds(back_s);
+    checks.take(fix);
+  }
+  EXPECT_THAT(checks.remarks(), testing::IsEmpty());
+  fix.stamp_ns = newest_ns - from_seconds(2.6);
+  checks.take(fix);
+  EXPECT_THAT(checks.remarks(), testing::ElementsAre(HasSubstr("goes back")));
+  MeasurementChecks of_imu;
+  ImuSample imu;
+  imu.frame_id = "imu";
+  imu.accel_mps2.z() = 9.81;
+  for (const Nanoseconds stamp_ns : {newest_ns, newest_ns - 1}) {
+    imu.stamp_ns = stamp_ns;
+    of_imu.take(imu);
+  }
+  EXPECT_THAT(of_imu.remarks(), testing::ElementsAre(HasSubstr("goes back")));
+}
+
 TEST(MeasurementChecks, tells_swapped_coordinates_from_those_out_of_range) {
   MeasurementChecks swapped;
   GnssFix fix = sample_fix(0);
