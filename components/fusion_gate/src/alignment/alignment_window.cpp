@@ -22,7 +22,7 @@ bool AlignmentWindow::add(const AlignmentPair& pair) {
     return false;
   }
   pairs_.push_back(pair);
-  slides_.push_back({lio_m2_});
+  pairs_.back().slide = {lio_m2_};
   bound();
   solve();
   return true;
@@ -30,11 +30,10 @@ bool AlignmentWindow::add(const AlignmentPair& pair) {
 
 void AlignmentWindow::on_lio(const Eigen::Vector3d& variance_odom_m2, double moved_m) {
   lio_m2_ = variance_odom_m2;
-  for (std::size_t k = 0; k < pairs_.size(); ++k) {
-    Slide& slide = slides_[k];
+  for (AlignmentPair& pair : pairs_) {
+    Slide& slide = pair.slide;
     slide.changed_m2 = slide.changed_m2.cwiseMax((variance_odom_m2 - slide.then_m2).cwiseAbs());
     slide.inherited_m2 += kInherited_per_m * moved_m * variance_odom_m2;
-    pairs_[k].slid_odom_m2 = slide.changed_m2 + slide.inherited_m2;
   }
 }
 
@@ -55,22 +54,15 @@ bool AlignmentWindow::is_redundant(const AlignmentPair& pair) const {
 
 void AlignmentWindow::bound() {
   const double oldest_m = pairs_.back().distance_m - config_.window_m;
-  const auto first = std::find_if(pairs_.begin(), pairs_.end(), [&](const AlignmentPair& pair) {
-    return pair.distance_m >= oldest_m;
-  });
-  slides_.erase(slides_.begin(), slides_.begin() + (first - pairs_.begin()));
-  pairs_.erase(pairs_.begin(), first);
+  std::erase_if(pairs_, [&](const AlignmentPair& pair) { return pair.distance_m < oldest_m; });
   if (pairs_.size() <= static_cast<std::size_t>(config_.max_pairs)) {
     return;
   }
   std::vector<AlignmentPair> kept;
-  std::vector<Slide> kept_slides;
   for (std::size_t k = (pairs_.size() - 1) % 2; k < pairs_.size(); k += 2) {  // keeps the newest
     kept.push_back(pairs_[k]);
-    kept_slides.push_back(slides_[k]);
   }
   pairs_ = std::move(kept);
-  slides_ = std::move(kept_slides);
   spacing_factor_ *= 2.0;
 }
 

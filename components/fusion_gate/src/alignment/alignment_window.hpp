@@ -46,18 +46,8 @@ class AlignmentWindow {
 
   AlignmentConfig config_;
   double scale_sigma_;
-
-  /// Of a pair: the variance of LIO's place then, by how much it differed most from that since, and
-  /// what new map took over from it.
-  struct Slide {
-    Eigen::Vector3d then_m2;
-    Eigen::Vector3d changed_m2{Eigen::Vector3d::Zero()};
-    Eigen::Vector3d inherited_m2{Eigen::Vector3d::Zero()};
-  };
-
   Eigen::Vector3d lio_m2_{Eigen::Vector3d::Zero()};  ///< newest variance of LIO's place
   std::vector<AlignmentPair> pairs_;
-  std::vector<Slide> slides_;  ///< of `pairs_`
   double spacing_factor_{1.0};
   std::optional<YawPrior> heading_;
   std::optional<AlignmentSolution> solution_;

@@ -151,7 +151,8 @@ Covariances residual_covariances(const std::vector<AlignmentPair>& pairs,
                            (i == j ? config.white_share : 0.0);
       const double drift_m2 =
           std::min(drift_variance(a, now_m, config), drift_variance(b, now_m, config));
-      const Eigen::Vector3d slid_m2 = map_from_odom2 * a.slid_odom_m2.cwiseMin(b.slid_odom_m2);
+      const Eigen::Vector3d slid_m2 =
+          map_from_odom2 * a.slide.variance_m2().cwiseMin(b.slide.variance_m2());
       for (int axis = 0; axis < 3; ++axis) {
         const double value = share * std::sqrt(a.variance_map_m2[axis] * b.variance_map_m2[axis]);
         const double tilt_m2 = axis == 2 ? tilt_covariance_m2(a, b, pairs.back(), config) : 0.0;

@@ -16,6 +16,15 @@
 
 namespace trigpoint::fusion_gate {
 
+/// How far LIO may have slid since a moment, along the axes of odom, beyond its drift.
+struct Slide {
+  Eigen::Vector3d then_m2{Eigen::Vector3d::Zero()};       ///< variance of LIO's place then
+  Eigen::Vector3d changed_m2{Eigen::Vector3d::Zero()};    ///< by which it differed most since
+  Eigen::Vector3d inherited_m2{Eigen::Vector3d::Zero()};  ///< what new map took over from it
+
+  Eigen::Vector3d variance_m2() const { return changed_m2 + inherited_m2; }
+};
+
 /// The antenna at one moment, seen from both sides.
 struct AlignmentPair {
   Nanoseconds stamp_ns{0};
@@ -25,8 +34,7 @@ struct AlignmentPair {
   double distance_m{0.0};  ///< driven when the pair was made
   /// Of its variance, when the residuals testify that it is smaller: what the receiver itself says.
   double least_share{1.0};
-  /// By how much LIO may have slid since, along the axes of odom, beyond its drift.
-  Eigen::Vector3d slid_odom_m2{Eigen::Vector3d::Zero()};
+  Slide slide{};  ///< since then
 };
 
 struct AlignmentSolution {

@@ -9,7 +9,7 @@ namespace trigpoint::fusion_gate {
 
 namespace {
 
-constexpr std::size_t kKnown = 64;  // as long as any window, of a receiver at 20 Hz
+constexpr std::size_t kKnown = 64;        // as long as any window, of a receiver at 20 Hz
 constexpr std::size_t kLeastKnown = 8;    // fewer do not tell the receiver's interval
 constexpr double kLongestInterval = 1.6;  // of the usual one: stamps jitter, a lost fix makes two
 /// A fix may be as much later than the latest of those before it.
