@@ -6,6 +6,7 @@
 
 #include "random_state.hpp"
 #include "scan_matcher.hpp"
+#include "unchanging_map.hpp"
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
 
@@ -164,7 +165,7 @@ TEST(IteratedUpdate, reports_directions_that_nobody_saw) {
 }
 
 /// Three walls of a room.
-class RoomMap final : public LocalMap {
+class RoomMap final : public UnchangingMap {
  public:
   bool match_surface(const Eigen::Vector3d& p, PlaneMatch& plane) const override {
     int axis = 0;
@@ -174,20 +175,6 @@ class RoomMap final : public LocalMap {
     plane.thickness2_m2 = 1e-4;
     return true;
   }
-
-  void insert(const PointCloud&) override {}
-
-  void prune(const Eigen::Vector3d&, double) override {}
-
-  void transform(const Pose&) override {}
-
-  void rebuild(const PointCloud&) override {}
-
-  std::size_t memory_bytes() const override { return 0; }
-
-  PointCloud points() const override { return {}; }
-
-  std::size_t size() const override { return 1; }
 };
 
 /// One thread; that more change nothing has a test of its own.

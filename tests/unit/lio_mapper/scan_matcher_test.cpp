@@ -5,6 +5,7 @@
 
 #include "trigpoint/base/so3.hpp"
 
+#include "unchanging_map.hpp"
 #include "voxel_key.hpp"
 #include <Eigen/Cholesky>
 #include <gtest/gtest.h>
@@ -18,7 +19,7 @@ namespace trigpoint::lio_mapper {
 namespace {
 
 /// A room 8 m wide; walls of x are there only when `ends` is set: else it is a tunnel.
-class Room final : public LocalMap {
+class Room final : public UnchangingMap {
  public:
   explicit Room(bool ends) : ends_(ends) {}
 
@@ -40,20 +41,6 @@ class Room final : public LocalMap {
     ++nearest_asked;
     return false;
   }
-
-  void insert(const PointCloud& /*points_odom*/) override {}
-
-  void prune(const Eigen::Vector3d& /*center_odom_m*/, double /*half_side_m*/) override {}
-
-  void transform(const Pose& /*T_new_old*/) override {}
-
-  void rebuild(const PointCloud& /*points_odom*/) override {}
-
-  PointCloud points() const override { return {}; }
-
-  std::size_t size() const override { return 1; }
-
-  std::size_t memory_bytes() const override { return 0; }
 
   mutable std::atomic<int> surfaces_asked{0};
   mutable std::atomic<int> nearest_asked{0};
@@ -245,7 +232,7 @@ TEST(ScanMatcher, residuals_of_a_wrong_prediction_lose_nothing) {
 
 /// Floor and ceiling of the room; between them crowns, in which every point has a plane of chance
 /// beside it wherever it is, or upright planes 8 m apart that stay where they are.
-class Grove final : public LocalMap {
+class Grove final : public UnchangingMap {
  public:
   explicit Grove(bool is_solid) : is_solid_(is_solid) {}
 
@@ -275,20 +262,6 @@ class Grove final : public LocalMap {
     plane = {normal, -normal.dot(centre) + beside_m(chance), kCrown2_m2, 0.0};
     return true;
   }
-
-  void insert(const PointCloud& /*points_odom*/) override {}
-
-  void prune(const Eigen::Vector3d& /*center_odom_m*/, double /*half_side_m*/) override {}
-
-  void transform(const Pose& /*T_new_old*/) override {}
-
-  void rebuild(const PointCloud& /*points_odom*/) override {}
-
-  PointCloud points() const override { return {}; }
-
-  std::size_t size() const override { return 1; }
-
-  std::size_t memory_bytes() const override { return 0; }
 
  private:
   static constexpr double kCrown2_m2 = 0.1 * 0.1;
