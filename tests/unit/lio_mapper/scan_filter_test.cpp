@@ -14,7 +14,7 @@ namespace {
 using testing_support::RoomDrive;
 
 constexpr Nanoseconds kFilterEpoch_ns = RoomDrive::kEpoch_ns;
-constexpr Nanoseconds kSweep_ns = 100'000'000;
+constexpr Nanoseconds kFilterSweep_ns = 100'000'000;
 
 class ScanFilterInAHall : public testing::Test {
  protected:
@@ -34,7 +34,8 @@ class ScanFilterInAHall : public testing::Test {
   ScanOutcome process(ScanFilter& filter, int sweep) const {
     SweepDecoder decoder{SweepTimingConfig{}};
     Events events;
-    const auto decoded = decoder.decode(room.sweep_at(kFilterEpoch_ns + sweep * kSweep_ns), events);
+    const auto decoded =
+        decoder.decode(room.sweep_at(kFilterEpoch_ns + sweep * kFilterSweep_ns), events);
     return filter.process(std::get<Sweep>(decoded), imu);
   }
 
