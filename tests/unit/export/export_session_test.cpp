@@ -232,6 +232,27 @@ TEST_F(ExportSession, writes_no_sixtieth_second) {
   EXPECT_THAT(read_all(out("trajectories.geojson")), HasSubstr("2023-11-14T22:14:00Z"));
 }
 
+TEST_F(ExportSession, dates_the_files_in_the_archive_by_the_end_of_the_drive) {
+  {
+    TrajectoryWriter fused(path_in(session(), session_file::kFused), "base_link in map");
+    fused.append(1'700'000'040'000'000'000, Pose{});
+    fused.append(1'700'000'045'123'400'000, Pose{});  // 2023-11-14 22:14:05
+  }
+  write_datum(path_in(session(), session_file::kDatum), {43.9, -78.9, 100.0});
+  export_session(session(), out(), {{"kmz"}});
+  const std::string zip = read_all(out("session.kmz"));
+  const unsigned time = (22U << 11U) | (14U << 5U) | (5U / 2U);
+  const unsigned date = ((2023U - 1980U) << 9U) | (11U << 5U) | 14U;
+  std::string stamp;
+  for (const unsigned number : {time, date}) {
+    stamp += {static_cast<char>(number & 0xFFU), static_cast<char>(number >> 8U)};
+  }
+  const std::size_t directory = zip.find("PK\1\2");
+  ASSERT_NE(directory, std::string::npos);
+  EXPECT_EQ(zip.substr(10, 4), stamp) << "of the first entry itself";
+  EXPECT_EQ(zip.substr(directory + 12, 4), stamp) << "in the directory";
+}
+
 TEST_F(ExportSession, names_the_file_that_the_disk_had_no_room_for_and_leaves_no_part_of_it) {
   PointCloud cloud;
   for (int i = 0; i < 20'000; ++i) {
