@@ -30,6 +30,9 @@ constexpr double kCell_m = 1.5;
 constexpr std::size_t kDisplacedPoints = 1000;
 /// A share of the information that is less certain than this many sigmas is none.
 constexpr double kCertainShare_sigmas = 2.0;
+/// What is vague is believed when at least this share of the pull is certain: three posts in a
+/// field pull back all that they promise, crowns and rings on a ceiling a third.
+constexpr double kMostlyPulled = 0.5;
 /// Of the promise, where one patch holds the rest.
 constexpr double kLeastPromise = 1e-3;
 }  // namespace
@@ -149,9 +152,10 @@ void ScanMatcher::judge_open_axes(const Viewpoint& view, const Eigen::Matrix3d& 
       const Share pulled = share_of(by_patch);
       along = std::clamp(pulled.share - kCertainShare_sigmas * pulled.sigma, 0.0, 1.0);
       trust = trust_in(axis, cells);
-      // Matches hold within the displacement only: what is vaguer tells nothing.
+      // Vaguer than the displacement within which matches hold, and most of it not even certain.
       const double left = trust * along * along * promised_here;
-      trust = left * kDisplaced_m * kDisplaced_m < 1.0 ? 0.0 : trust;
+      const bool is_vague = left * kDisplaced_m * kDisplaced_m < 1.0;
+      trust = is_vague && along < kMostlyPulled ? 0.0 : trust;
     }
     open_.pulled_back += along * axis * axis.transpose();
     open_.root_trust += std::sqrt(trust) * axis * axis.transpose();
