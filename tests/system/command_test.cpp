@@ -399,7 +399,7 @@ TEST(Command, two_players_on_one_domain_are_refused_with_the_other_one_s_process
   std::this_thread::sleep_for(4s);
   const TemporaryFolder folder;
   for (const std::string& option :
-       {std::string("--check"), "--session=" + folder.path("refused")}) {
+       {std::string("--check"), std::string("--wait=0"), "--session=" + folder.path("refused")}) {
     const CommandResult second =
         run_command({program(), "play", "short", option}, 60s, environment);
     EXPECT_EQ(second.exit_code, 1) << second.output;

@@ -35,13 +35,6 @@ Eigen::Matrix4d drift_noise(const DriftRate& rate,
                             const Eigen::Matrix3d& R_frame_odom,
                             const Eigen::Vector3d& p_odom_m);
 
-/// Adds to `covariance` tilts of odom against gravity about odom's x and y, as long as it is nearly
-/// level. Once there is an alignment they turn it about the robot.
-void add_tilt_noise(const Eigen::Matrix2d& tilt_rad2,
-                    const State& state,
-                    bool aligned,
-                    ErrorMatrix& covariance);
-
 /// Adds to `covariance` what odom may drift against map over `distance_m`: the noise above and a
 /// tilt, which likewise turns odom about the robot. Before the alignment only the tilt.
 void add_drift_noise(const DriftRate& rate,

@@ -24,10 +24,10 @@ constexpr double kOpenRotation_rad = 2e-3;
 /// By so much a scan is displaced to see whether it is pulled back: within this other points become
 /// the nearest, and surfaces are still found.
 constexpr double kDisplaced_m = 0.25;
-/// Side of the cubes whose planes are taken to be right or wrong together.
-constexpr double kCell_m = 1.5;
 /// So many points tell that.
 constexpr std::size_t kDisplacedPoints = 1000;
+/// Side of the cubes whose planes are taken to be right or wrong together.
+constexpr double kCell_m = 1.5;
 /// A share of the information that is less certain than this many sigmas is none.
 constexpr double kCertainShare_sigmas = 2.0;
 /// What is vague is believed when at least this share of the pull is certain: three posts in a
@@ -35,6 +35,7 @@ constexpr double kCertainShare_sigmas = 2.0;
 constexpr double kMostlyPulled = 0.5;
 /// Of the promise, where one patch holds the rest.
 constexpr double kLeastPromise = 1e-3;
+
 }  // namespace
 
 /// Into which cube of this side each point falls; how many cubes there are. Points out of the
