@@ -60,9 +60,9 @@ std::string map_drive(const MapTask& task,
   options.log = scenario;
   options.mode = task.mode;
   const std::string truth_folder = session + "_truth_of_" + scenario;
-  exporter::create_session_folder(truth_folder);
   const std::string truth = path_in(truth_folder, file::kTruth);
-  cli::Input input = cli::open_input(options, truth);
+  cli::Input input = cli::open_input(options);
+  cli::leave_truth(input, truth_folder);
   pipeline::MapLogOptions how;
   how.session = session;
   how.config_text = cli::print(input.config);

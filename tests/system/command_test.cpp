@@ -397,7 +397,9 @@ TEST(Command, two_players_on_one_domain_are_refused_with_the_other_one_s_process
   const tests::Command first({program(), "play", "short", "--rate", "1", "--allow-no-reader"},
                              environment);
   std::this_thread::sleep_for(4s);
-  for (const char* option : {"--check", "--wait=0"}) {
+  const TemporaryFolder folder;
+  for (const std::string& option :
+       {std::string("--check"), std::string("--wait=0"), "--session=" + folder.path("refused")}) {
     const CommandResult second =
         run_command({program(), "play", "short", option}, 60s, environment);
     EXPECT_EQ(second.exit_code, 1) << second.output;
@@ -406,6 +408,7 @@ TEST(Command, two_players_on_one_domain_are_refused_with_the_other_one_s_process
                       HasSubstr("process " + std::to_string(first.pid())),
                       HasSubstr("ROS_DOMAIN_ID")));
   }
+  EXPECT_FALSE(fs::exists(folder.path("refused")));
 }
 
 TEST(Command, a_warning_that_repeats_is_told_once_with_its_number) {

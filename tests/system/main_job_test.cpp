@@ -20,6 +20,7 @@ namespace {
 
 using namespace std::chrono_literals;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using tests::Command;
 using tests::CommandResult;
 using tests::run_command;
@@ -90,6 +91,13 @@ CommandResult MainJob::offline_;
 TEST_F(MainJob, ends_well_over_dds_and_offline) {
   EXPECT_EQ(dds_.exit_code, 0) << dds_.output;
   EXPECT_EQ(offline_.exit_code, 0) << offline_.output;
+}
+
+/// The gate hands back what it follows: that is no other filter.
+TEST_F(MainJob, has_a_gps_filter_that_does_not_take_itself_for_another_one) {
+  for (const auto& log : fs::directory_iterator(dds_session() + "/logs")) {
+    EXPECT_THAT(tests::read_file(log.path().string()), Not(HasSubstr("warm_start"))) << log.path();
+  }
 }
 
 TEST_F(MainJob, leaves_every_file_of_a_session) {
@@ -180,6 +188,22 @@ TEST(MainJobStopped, by_the_user_keeps_what_was_done_and_says_so) {
   EXPECT_THAT(result.output, HasSubstr("interrupted"));
   EXPECT_TRUE(fs::exists(session + "/map.pcd")) << result.output;
   EXPECT_TRUE(fs::exists(session + "/report.md"));
+}
+
+TEST(MainJobStopped, before_anything_was_driven_leaves_nothing_in_the_way_of_the_next_run) {
+  const TemporaryFolder folder;
+  const std::string session = folder.path("session");
+  Command job({script(), kScenario, "--no-build", "--rate", "1", "--out", session}, environment(4));
+  const auto deadline = std::chrono::steady_clock::now() + 60s;
+  while (!fs::exists(session + "/config.yaml") && std::chrono::steady_clock::now() < deadline) {
+    std::this_thread::sleep_for(2ms);
+  }
+  ASSERT_TRUE(fs::exists(session + "/config.yaml")) << job.output_so_far();
+  job.signal(SIGINT);
+  const CommandResult result = job.wait(60s);
+  EXPECT_EQ(result.exit_code, 130) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("nothing is left of it"));
+  EXPECT_FALSE(fs::exists(session));
 }
 
 /// Kills each successor of the mapper as soon as it is there, until there is none any more.

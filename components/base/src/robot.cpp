@@ -15,6 +15,21 @@ Eigen::Quaterniond RobotConfig::q_base_imu() const {
   return from_roll_pitch_yaw(imu_roll_pitch_yaw_base_rad);
 }
 
+namespace {
+
+/// A topic without which there is nothing to do.
+void needed_topic(ConfigFields& fields,
+                  const std::string& key,
+                  std::string& topic,
+                  const std::string& doc) {
+  fields.text(key, topic, doc);
+  if (topic.find_first_not_of("/ ") == std::string::npos) {
+    throw ConfigError("robot." + key + " must name a topic; is '" + topic + "'");
+  }
+}
+
+}  // namespace
+
 void describe(RobotConfig& config, ConfigFields& fields) {
   fields.vector3("lidar_position_base_m",
                  config.lidar_position_base_m,
@@ -28,11 +43,12 @@ void describe(RobotConfig& config, ConfigFields& fields) {
   fields.vector3("imu_roll_pitch_yaw_base_rad",
                  config.imu_roll_pitch_yaw_base_rad,
                  "R_base_imu, when the IMU is mounted turned");
-  fields.text("points_topic",
-              config.points_topic,
-              "PointCloud2, in a log or on the bus, without a leading slash");
-  fields.text("imu_topic", config.imu_topic, "Imu");
-  fields.text("fix_topic", config.fix_topic, "NavSatFix");
+  needed_topic(fields,
+               "points_topic",
+               config.points_topic,
+               "PointCloud2, in a log or on the bus, without a leading slash");
+  needed_topic(fields, "imu_topic", config.imu_topic, "Imu");
+  needed_topic(fields, "fix_topic", config.fix_topic, "NavSatFix");
   fields.text(
       "twist_topic",
       config.twist_topic,

@@ -166,7 +166,7 @@ void refuse_aiding(const std::string& scenario, const SystemConfig& config) {
   }
 }
 
-Input open_scenario(const InputOptions& options, const std::string& truth_file) {
+Input open_scenario(const InputOptions& options) {
   const simulator::Scenario scenario =
       simulator::load_scenario(with_changes(options.log, options.changes));
   const std::optional<double> duration_s = scenario_duration_s(options.duration_s);
@@ -175,10 +175,10 @@ Input open_scenario(const InputOptions& options, const std::string& truth_file) 
   check_cores(input.config);
   refuse_aiding(options.log, input.config);
   auto reader = simulator::open_scenario(scenario, options.seed.value_or(1), duration_s);
-  if (!truth_file.empty()) {
-    exporter::create_session_folder(fs::path(truth_file).parent_path().string());
-    reader->write_truth(truth_file);
-  }
+  input.write_truth = [stream = reader.get()](const std::string& file) {
+    exporter::create_session_folder(fs::path(file).parent_path().string());
+    stream->write_truth(file);
+  };
   input.reader = std::move(reader);
   return input;
 }
@@ -290,14 +290,20 @@ std::string with_changes(const std::string& scenario, const ScenarioChanges& cha
   return composed;
 }
 
-Input open_input(const InputOptions& given, const std::string& truth_file) {
+void leave_truth(const Input& input, const std::string& session) {
+  if (input.write_truth) {
+    input.write_truth(exporter::path_in(session, exporter::session_file::kTruth));
+  }
+}
+
+Input open_input(const InputOptions& given) {
   InputOptions options = given;
   if (fs::path(given.log).filename() == "metadata.yaml" && fs::exists(given.log)) {
     options.log = fs::absolute(given.log).parent_path().string();  // a rosbag2's, by its index
   }
   const bool recorded = fs::exists(options.log) && fs::path(options.log).extension() != ".yaml";
   if (!recorded && simulator::is_scenario(options.log)) {
-    return open_scenario(options, truth_file);
+    return open_scenario(options);
   }
   if (!recorded) {
     throw ConfigError(options.log + ": no such file or folder, nor a scenario; scenarios are: " +

@@ -9,6 +9,7 @@
 #include "verbs.hpp"
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -40,6 +41,9 @@ struct InputOptions {
 struct Input {
   std::unique_ptr<recording::LogReader> reader;
   SystemConfig config;
+  /// Of a scenario: its truth (TUM, for scoring only) goes to a file, whose folder is made. Empty
+  /// of a recorded drive. Not after `reader` has gone.
+  std::function<void(const std::string& file)> write_truth;
 };
 
 /// The arguments --beams, --start and --day.
@@ -59,9 +63,12 @@ void add_config_options(CLI::App& verb, InputOptions& options);
 
 /// Throws LogError, and ConfigError when what the user asked for is wrong: no such log, a topic
 /// that he named and that is not in it, a seed for a recorded drive, a core's configuration. A
-/// scenario is streamed without being written; its truth goes to `truth_file` (for scoring only)
-/// unless that is empty, and nothing is written before all is known to be right.
-Input open_input(const InputOptions& options, const std::string& truth_file = {});
+/// scenario is streamed without being written.
+Input open_input(const InputOptions& options);
+
+/// The truth of a scenario into `session`, for when all is known to be right and nothing is refused
+/// any more; of a recorded drive nothing.
+void leave_truth(const Input& input, const std::string& session);
 
 /// The configuration alone, without a log.
 SystemConfig load_config_of(const InputOptions& options);

@@ -39,9 +39,6 @@ void require_session(const std::string& folder) {
                     "lio.tum, gps.tum is in it); trigpoint map and bringup/run leave one");
 }
 
-/// Thrown out of the export: files that are not whole go on the way.
-struct Interrupted {};
-
 /// What was asked for by name and could not be written is a failure; what "all" cannot do is not.
 int run(const ExportVerbOptions& options) {
   require_session(options.session);

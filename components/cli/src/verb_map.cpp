@@ -119,12 +119,12 @@ pipeline::MapLogResult map(const MapOptions& options, std::string& refused_imu, 
     not_resumed = not_resumed || event.code == "lio_not_resumed";
   });
   std::optional<pipeline::StoredSession> stored = stored_of(options);
-  Input input =
-      open_input(options.input, exporter::path_in(options.out, exporter::session_file::kTruth));
+  Input input = open_input(options.input);
   if (stored) {
     keep_datum(stored->datum, input.config.cores.gps_odometry);
     refuse_older_log(options, *stored, input.reader->summary());
   }
+  leave_truth(input, options.out);
   pipeline::MapLogResult result;
   {
     Progress progress("mapping");

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
 #include "trigpoint/export/correct_session.hpp"
+#include "trigpoint/shell/stop_signal.hpp"
 
 #include "input.hpp"
+#include "interruption.hpp"
 #include "number_checks.hpp"
 #include "progress.hpp"
 #include "verbs.hpp"
@@ -25,12 +27,19 @@ struct MergeOptions {
 int run(const MergeOptions& options) {
   refuse_used_folder(options.out);
   exporter::MergeReport report;
-  {
+  try {
+    const shell::StopSignal stop;
     Progress progress("merging");
     report = exporter::merge_sessions(
         options.first, options.second, options.out, options.voxel_m, [&](double share) {
+          if (stop.requested()) {
+            throw Interrupted();
+          }
           progress(share);
         });
+  } catch (const Interrupted&) {
+    std::cerr << "trigpoint merge: interrupted; nothing of it is left in " << options.out << "\n";
+    return kInterrupted;
   }
   std::cout << report.graph.keyframes << " keyframes, " << report.graph.rows << " GPS rows, "
             << report.graph.loops << " loop closures, " << report.loops_between

@@ -140,12 +140,12 @@ int run(const PlayVerbOptions& options) {
   refuse_played_session(options.session);
   const shell::StopSignal stop;
   const shell::EventLog log("play");
-  const std::string truth =
-      options.session.empty() ? ""
-                              : exporter::path_in(options.session, exporter::session_file::kTruth);
-  Input input = open_input(options.input, truth);
+  Input input = open_input(options.input);
   if (const int code = guard_bus(options, input.config); code != 0) {
     return code;
+  }
+  if (!options.session.empty()) {
+    leave_truth(input, options.session);
   }
   SessionPart session(options.session, log);
   session.begin(*input.reader, input.config);

@@ -62,7 +62,8 @@ bool run_drive(const DriveToRun& drive,
                const shell::StopSignal& stop,
                std::vector<std::string>& problems) {
   const std::string folder = exporter::path_in(options.out, drive.about.name);
-  const Input input = open_input(drive.input, exporter::path_in(folder, file::kTruth));
+  const Input input = open_input(drive.input);
+  leave_truth(input, folder);
   Warnings warnings;
   std::vector<pipeline::RunOfMany> runs =
       runs_of(drive, input.config, {options.withhold_every_s, options.withhold_for_s});

@@ -35,6 +35,29 @@ std::string title_of(const std::string& name) {
   return name.substr(name.find_last_of('/') + 1);
 }
 
+/// A picture goes its own way, without the text that tells of this; empty when nothing is left out.
+std::string left_out_of(const Comparison& comparison) {
+  namespace file = exporter::session_file;
+  std::string names;
+  for (const char* name : {file::kFused,
+                           file::kFusedSmoothed,
+                           file::kLio,
+                           file::kGps,
+                           file::kTruth,
+                           file::kFixes,
+                           file::kConfig}) {
+    const auto is_of = [&](const std::string& sentence) {
+      return sentence.find("/" + std::string(name)) != std::string::npos;
+    };
+    if (std::any_of(comparison.damaged.begin(), comparison.damaged.end(), is_of)) {
+      names += (names.empty() ? "" : ", ") + std::string(name);
+    }
+  }
+  return names.empty() ? ""
+                       : "set label 1 " + quoted("Left out, cannot be read: " + names) +
+                             " at screen 0.012,0.012 noenhanced textcolor rgb '#c02942'\n";
+}
+
 /// The pairs of one estimate, aligned.
 struct ComparedCurve {
   std::string title;
@@ -82,6 +105,7 @@ Nanoseconds begin_of(const std::vector<ComparedCurve>& curves) {
 
 std::string draw_errors(const ComparisonBlock& block,
                         AlignmentKind kind,
+                        const std::string& left_out,
                         const std::string& folder,
                         const std::string& gnuplot) {
   const auto curves = curves_of(block, kind);
@@ -108,11 +132,12 @@ std::string draw_errors(const ComparisonBlock& block,
                  ", alignment: " + name_of(kind))
        << " noenhanced\n"
        << "set grid lc rgb '#cccccc'\nset tics out nomirror\nset lmargin 10\nset rmargin 3\n"
-       << "set key outside top center horizontal noenhanced\n";
+       << "set key outside top center horizontal noenhanced\n"
+       << left_out;
   for (std::size_t axis = 0; axis < kAxes.size(); ++axis) {
     body << "set ylabel '" << kAxes[axis] << "'\n"
          << (axis + 1 == kAxes.size() ? "set xlabel 'time [s]'\nset yrange [0:*]\n" : "")
-         << (axis == 1 ? "unset key\n" : "") << "plot ";
+         << (axis == 1 ? "unset key\nunset label\n" : "") << "plot ";
     for (std::size_t i = 0; i < files.size(); ++i) {
       body << (i == 0 ? "" : ", ") << files[i] << " using 1:" << axis + 2 << " with lines"
            << curves[i].style << " title " << quoted(curves[i].title);
@@ -124,6 +149,7 @@ std::string draw_errors(const ComparisonBlock& block,
 }
 
 std::string draw_top_view(const ComparisonBlock& block,
+                          const std::string& left_out,
                           const std::string& folder,
                           const std::string& gnuplot) {
   const auto curves = curves_of(block, AlignmentKind::kYawTranslation);
@@ -137,7 +163,8 @@ std::string draw_top_view(const ComparisonBlock& block,
        << "' noenhanced\nset xlabel 'x (E) [m]' offset 0,0.6\nset ylabel 'y (N) [m]'\nset size "
           "ratio -1\n"
        << "set grid lc rgb '#cccccc'\nset tics out nomirror\n"
-       << "set key outside below center horizontal noenhanced\nplot ";
+       << "set key outside below center horizontal noenhanced\n"
+       << left_out << "plot ";
   const auto longest =
       std::max_element(curves.begin(), curves.end(), [](const auto& a, const auto& b) {
         return a.pairs.size() < b.pairs.size();
@@ -174,10 +201,11 @@ std::vector<std::string> draw(const Comparison& comparison,
       pictures.push_back(picture);
     }
   };
+  const std::string left_out = left_out_of(comparison);
   for (const ComparisonBlock& block : comparison.blocks) {
-    add(draw_errors(block, AlignmentKind::kNone, folder, gnuplot));
-    add(draw_errors(block, AlignmentKind::kYawTranslation, folder, gnuplot));
-    add(draw_top_view(block, folder, gnuplot));
+    add(draw_errors(block, AlignmentKind::kNone, left_out, folder, gnuplot));
+    add(draw_errors(block, AlignmentKind::kYawTranslation, left_out, folder, gnuplot));
+    add(draw_top_view(block, left_out, folder, gnuplot));
   }
   return pictures;
 }

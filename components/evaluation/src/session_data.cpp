@@ -27,6 +27,11 @@ constexpr double kSameDatum_m = 0.001;
 
 enum class Need { kExpected, kOptional };
 
+void note_damage(SessionData& data, const std::string& cause) {
+  data.damaged.push_back(cause + ".");
+  data.problems.push_back(data.damaged.back());
+}
+
 /// Runs `read` on the file when it exists; a damaged or missing expected file becomes a problem.
 template <typename Read>
 void load(SessionData& data, const std::string& name, Need need, const Read& read) {
@@ -42,8 +47,7 @@ void load(SessionData& data, const std::string& name, Need need, const Read& rea
   } catch (const std::exception& error) {
     const std::string cause = error.what();
     const bool is_named = cause.find(path) != std::string::npos;
-    data.damaged.push_back((is_named ? "" : path + ": ") + cause + ".");
-    data.problems.push_back(data.damaged.back());
+    note_damage(data, (is_named ? "" : path + ": ") + cause);
   }
 }
 
@@ -127,18 +131,31 @@ void load_counts(SessionData& data) {
   });
 }
 
+/// Of the configuration when it says so; what is no number is told, and `value` left alone.
+template <typename Number>
+void read_number(SessionData& data,
+                 const YAML::Node& config,
+                 const std::string& section,
+                 const char* key,
+                 Number& value) {
+  const YAML::Node within = config[section];
+  const YAML::Node entry = within && within.IsMap() ? within[key] : YAML::Node();
+  if (entry.IsDefined() && !entry.IsNull() && !YAML::convert<Number>::decode(entry, value)) {
+    note_damage(data,
+                data.path(file::kConfig) + ": " + section + "." + key + " must be a number; is " +
+                    YAML::Dump(entry));
+  }
+}
+
 /// The values of the effective configuration that the report needs.
 void load_config(SessionData& data, const ReportOptions& options) {
   load(data, file::kConfig, Need::kExpected, [&](const auto& path) {
     const YAML::Node config = YAML::LoadFile(path);
-    if (const YAML::Node gps = config["gps_odometry"]; gps && gps.IsMap()) {
-      data.datum_fixes = gps["datum_fixes"].as<std::int64_t>(data.datum_fixes);
-    }
-    if (const YAML::Node robot = config["robot"]; robot && robot.IsMap()) {
-      const double undulation_m = robot["geoid_undulation_m"].as<double>(0.0);
-      for (exporter::LoggedFix& logged : data.fixes) {
-        logged.fix.altitude_m += undulation_m;  // as the filter did
-      }
+    read_number(data, config, "gps_odometry", "datum_fixes", data.datum_fixes);
+    double undulation_m = 0.0;
+    read_number(data, config, "robot", "geoid_undulation_m", undulation_m);
+    for (exporter::LoggedFix& logged : data.fixes) {
+      logged.fix.altitude_m += undulation_m;  // as the filter did
     }
     const YAML::Node lever = config["robot"]["antenna_position_base_m"];
     if (options.antenna_position_base_m) {

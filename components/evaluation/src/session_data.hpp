@@ -24,7 +24,7 @@ struct ProgramCounts {
 struct SessionData {
   std::string folder;
   std::vector<std::string> problems;
-  std::vector<std::string> damaged;  ///< those of them that are of a file which cannot be read
+  std::vector<std::string> damaged;  ///< those of them that are of what cannot be read in a file
   std::optional<exporter::RunInfo> run;
   std::optional<Datum> datum;
   std::optional<exporter::AlignmentRecord> alignment;

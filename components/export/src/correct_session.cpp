@@ -7,6 +7,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
@@ -54,23 +55,50 @@ void write_keyframes(const std::string& file,
   }
 }
 
+[[noreturn]] void refuse(const std::string& file,
+                         const std::string& key,
+                         const std::string& rule,
+                         const YAML::Node& found) {
+  throw std::runtime_error(file + ":" + std::to_string(found.Mark().line + 1) + ": " + key +
+                           " must be " + rule + "; is " + YAML::Dump(found));
+}
+
+bool is_there(const YAML::Node& node) {
+  return node && !node.IsNull();
+}
+
+void widen(const YAML::Node& drift, const char* key, const std::string& file, double& sigma) {
+  const YAML::Node entry = drift[key];
+  double value = sigma;
+  if (is_there(entry) &&
+      !(YAML::convert<double>::decode(entry, value) && std::isfinite(value) && value >= 0.0)) {
+    refuse(file, std::string("lio_mapper.drift.") + key, "a number, 0 or more", entry);
+  }
+  sigma = std::max(sigma, value);
+}
+
 PastSettings read_past_settings(const std::string& file) {
   PastSettings settings;
   const YAML::Node config = YAML::LoadFile(file);
-  if (const YAML::Node mapper = config["lio_mapper"]; mapper && mapper["drift"]) {
-    const YAML::Node drift = mapper["drift"];
-    const auto widen = [&](const char* key, double& sigma) {
-      sigma = std::max(sigma, drift[key].as<double>(sigma));
-    };
-    widen("position_sigma_m_sqrtm", settings.drift.position_sigma_m_sqrtm);
-    widen("yaw_sigma_rad_sqrtm", settings.drift.yaw_sigma_rad_sqrtm);
-    widen("tilt_sigma_rad_sqrtm", settings.drift.tilt_sigma_rad_sqrtm);
-  }
-  if (const YAML::Node robot = config["robot"]; robot && robot["lidar_position_base_m"]) {
-    const auto p = robot["lidar_position_base_m"].as<std::vector<double>>();
-    if (p.size() == 3) {
-      settings.lidar_position_base_m = {p[0], p[1], p[2]};
+  if (const YAML::Node mapper = config["lio_mapper"]; is_there(mapper)) {
+    if (const YAML::Node drift = mapper["drift"]; is_there(drift)) {
+      if (!drift.IsMap()) {
+        refuse(file, "lio_mapper.drift", "a mapping of keys to values", drift);
+      }
+      widen(drift, "position_sigma_m_sqrtm", file, settings.drift.position_sigma_m_sqrtm);
+      widen(drift, "yaw_sigma_rad_sqrtm", file, settings.drift.yaw_sigma_rad_sqrtm);
+      widen(drift, "tilt_sigma_rad_sqrtm", file, settings.drift.tilt_sigma_rad_sqrtm);
     }
+  }
+  if (const YAML::Node robot = config["robot"];
+      is_there(robot) && is_there(robot["lidar_position_base_m"])) {
+    const YAML::Node entry = robot["lidar_position_base_m"];
+    std::vector<double> p;
+    if (!YAML::convert<std::vector<double>>::decode(entry, p) || p.size() != 3 ||
+        !std::all_of(p.begin(), p.end(), [](double each) { return std::isfinite(each); })) {
+      refuse(file, "robot.lidar_position_base_m", "three numbers", entry);
+    }
+    settings.lidar_position_base_m = {p[0], p[1], p[2]};
   }
   return settings;
 }

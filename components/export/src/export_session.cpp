@@ -319,6 +319,28 @@ void export_tracks(Work& work, const std::optional<TopView>& view) {
   export_kml(work, thin, view);
 }
 
+std::string sentence_without_datum(const std::string& formats) {
+  return "no datum.yaml in the session (no fix was good enough to place the map): " + formats +
+         " need a place on the Earth and are left out; pcd, ply, tum, kitti and csv do not";
+}
+
+/// Rendering the map takes minutes: what nothing can come of is told before.
+void refuse_without_earth(const Work& work) {
+  std::string formats;
+  for (const ExportFormat& format : export_formats()) {
+    if (work.wants(format.name)) {
+      if (work.earth || !format.needs_datum) {
+        return;
+      }
+      formats += (formats.empty() ? "" : ", ") + format.name;
+    }
+  }
+  const bool has_datum = fs::exists(path_in(work.session, session_file::kDatum));
+  throw std::runtime_error(work.session + ": nothing to export: " +
+                           (has_datum ? work.report.missing.back()  // too near a pole
+                                      : sentence_without_datum(formats)));
+}
+
 void say_what_is_missing(Work& work) {
   const auto& written = work.report.written;
   std::string without_datum;
@@ -336,9 +358,7 @@ void say_what_is_missing(Work& work) {
   }
   const bool has_datum = fs::exists(path_in(work.session, session_file::kDatum));
   if (!without_datum.empty() && !has_datum) {
-    work.report.missing.push_back(
-        "no datum.yaml in the session (no fix was good enough to place the map): " + without_datum +
-        " need a place on the Earth and are left out; pcd, ply, tum, kitti and csv do not");
+    work.report.missing.push_back(sentence_without_datum(without_datum));
   }
 }
 
@@ -378,6 +398,7 @@ ExportReport export_session(const std::string& session_folder,
   work.trajectories = read_trajectories(session_folder, work.report.missing);
   refuse_to_overwrite(work);
   find_earth(work);
+  refuse_without_earth(work);
   create_session_folder(out_folder);
   const std::optional<TopView> overlay = export_points(work);
   export_texts(work);

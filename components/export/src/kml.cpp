@@ -9,8 +9,13 @@
 #include <cpl_conv.h>
 #include <cpl_string.h>
 
+#include <algorithm>
 #include <array>
+#include <bit>
+#include <cstdint>
 #include <cstdio>
+#include <cstring>
+#include <ctime>
 #include <fstream>
 #include <memory>
 #include <vector>
@@ -18,6 +23,8 @@
 namespace trigpoint::exporter {
 
 namespace {
+
+static_assert(std::endian::native == std::endian::little, "an archive's numbers are little-endian");
 
 constexpr const char* kPictureInArchive = "files/top_view.png";
 
@@ -99,6 +106,60 @@ void add_to_archive(void* archive,
   GdalErrors::check(done, file, "write");
 }
 
+/// MS-DOS's time and date of an archive's entries (APPNOTE 4.4.6), UTC; before 1980, which it
+/// cannot say, its first day.
+std::uint32_t dos_time_of(Nanoseconds stamp_ns) {
+  constexpr std::uint32_t kFirstDay = (1U << 21U) | (1U << 16U);
+  const std::time_t seconds = stamp_ns / kNanosecondsPerSecond;
+  std::tm utc{};
+  if (gmtime_r(&seconds, &utc) == nullptr || utc.tm_year < 80 || utc.tm_year >= 80 + 128) {
+    return kFirstDay;
+  }
+  const auto bits = [](int value, unsigned shift) {
+    return static_cast<std::uint32_t>(value) << shift;
+  };
+  return bits(utc.tm_year - 80, 25) | bits(utc.tm_mon + 1, 21) | bits(utc.tm_mday, 16) |
+         bits(utc.tm_hour, 11) | bits(utc.tm_min, 5) | bits(utc.tm_sec / 2, 0);
+}
+
+template <typename Number>
+Number number_at(const std::string& bytes, std::size_t at) {
+  Number number{};
+  std::memcpy(&number, bytes.substr(at, sizeof(Number)).c_str(), sizeof(Number));
+  return number;
+}
+
+/// GDAL leaves month 0 of 1980 there, which no calendar has. The entries are found by the archive's
+/// directory (APPNOTE 4.3); one that is not as GDAL writes it is left as it is.
+void set_time_of_entries(std::string& zip, Nanoseconds stamp_ns) {
+  const std::uint32_t time = dos_time_of(stamp_ns);
+  const std::size_t end = zip.rfind("PK\5\6");
+  if (end == std::string::npos || end + 22 > zip.size()) {
+    return;
+  }
+  std::size_t entry = number_at<std::uint32_t>(zip, end + 16);
+  for (int left = number_at<std::uint16_t>(zip, end + 10); left > 0; --left) {
+    const std::size_t local =
+        entry + 46 > zip.size() ? 0 : number_at<std::uint32_t>(zip, entry + 42);
+    if (entry + 46 > zip.size() || zip.compare(entry, 4, "PK\1\2") != 0 ||
+        local + 30 > zip.size() || zip.compare(local, 4, "PK\3\4") != 0) {
+      return;
+    }
+    std::memcpy(&zip[entry + 12], &time, sizeof(time));
+    std::memcpy(&zip[local + 10], &time, sizeof(time));
+    entry += 46U + number_at<std::uint16_t>(zip, entry + 28) +
+             number_at<std::uint16_t>(zip, entry + 30) + number_at<std::uint16_t>(zip, entry + 32);
+  }
+}
+
+Nanoseconds end_of(const std::vector<Track>& tracks) {
+  Nanoseconds end_ns = 0;
+  for (const Track& track : tracks) {
+    end_ns = track.points.empty() ? end_ns : std::max(end_ns, track.points.back().stamp_ns);
+  }
+  return end_ns;
+}
+
 std::string content_of(const std::string& file) {
   std::ifstream in(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
@@ -144,6 +205,9 @@ void write_kmz(const std::string& file,
   }
   archive.reset();
   GdalErrors::check(true, file, "write");
+  std::string zip = content_of(target.part());
+  set_time_of_entries(zip, end_of(tracks));
+  write_text(target.part(), zip);
   target.commit();
 }
 

@@ -15,6 +15,8 @@ namespace trigpoint::exporter {
 
 namespace {
 
+namespace fs = std::filesystem;
+
 using lio_mapper::GraphInput;
 using lio_mapper::KeyframeReader;
 
@@ -23,7 +25,7 @@ constexpr double kAxis_m = 1000.0;
 
 Datum datum_of(const std::string& session) {
   const std::string file = path_in(session, session_file::kDatum);
-  if (!std::filesystem::exists(file)) {
+  if (!fs::exists(file)) {
     throw std::runtime_error(session + ": has no " + session_file::kDatum +
                              ": only sessions whose place on the Earth is known can be merged");
   }
@@ -77,6 +79,36 @@ void write_part(const std::string& file,
   }
 }
 
+/// Files get into `out` when all of them are whole: they are made in a hidden folder within it. One
+/// that a killed program left is removed.
+class Staging {
+ public:
+  explicit Staging(const std::string& out) : out_(out), hidden_(fs::path(out) / ".merging") {
+    fs::remove_all(hidden_);
+    create_session_folder(hidden_.string());
+  }
+
+  ~Staging() {
+    std::error_code ignored;
+    fs::remove_all(hidden_, ignored);
+  }
+
+  Staging(const Staging&) = delete;
+  Staging& operator=(const Staging&) = delete;
+
+  std::string file(const char* name) const { return path_in(hidden_.string(), name); }
+
+  void commit() const {
+    for (const fs::directory_entry& entry : fs::directory_iterator(hidden_)) {
+      fs::rename(entry.path(), out_ / entry.path().filename());
+    }
+  }
+
+ private:
+  fs::path out_;
+  fs::path hidden_;
+};
+
 }  // namespace
 
 MergeReport merge_sessions(const std::string& first,
@@ -103,16 +135,16 @@ MergeReport merge_sessions(const std::string& first,
         }
       });
   const CorrectedPoses poses = poses_of(input, past, first + " and " + second);
-  create_session_folder(out);
-  write_datum(path_in(out, session_file::kDatum), datum);
+  const Staging staging(out);
+  write_datum(staging.file(session_file::kDatum), datum);
   const std::vector<lio_mapper::MapSample> samples = lio_mapper::corrected_trajectory(input, past);
   const auto second_begins =
       std::find_if(samples.begin(), samples.end(), [&](const lio_mapper::MapSample& sample) {
         return sample.sweep >= sweeps_of_first;
       });
   const auto split = static_cast<std::size_t>(second_begins - samples.begin());
-  write_part(path_in(out, "first.tum"), samples, 0, split);
-  write_part(path_in(out, "second.tum"), samples, split, samples.size());
+  write_part(staging.file("first.tum"), samples, 0, split);
+  write_part(staging.file("second.tum"), samples, split, samples.size());
   render_keyframes(
       [&](const auto& visit) {
         first_store.visit(visit);
@@ -120,13 +152,14 @@ MergeReport merge_sessions(const std::string& first,
       },
       std::nullopt,
       voxel_m,
-      path_in(out, session_file::kMap),
+      staging.file(session_file::kMap),
       [&](double share) {
         if (progress) {
           progress(0.5 + 0.5 * share);
         }
       },
       {&poses, true, past_settings_of(first).lidar_position_base_m});
+  staging.commit();
   MergeReport report{past.report, 0};
   for (const lio_mapper::Loop& loop : past.loops) {
     report.loops_between += loop.earlier < begin_of_second && loop.later >= begin_of_second ? 1 : 0;

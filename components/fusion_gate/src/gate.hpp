@@ -104,6 +104,7 @@ struct FusionGate::Impl {
   bool has_odom_jumped(const Odometry& odometry);
   Odometry with_covariance_in_local_map(const Odometry& odometry) const;
   bool can_be_published(const Odometry& odometry) const;
+  Pose without_step(const Odometry& odometry);
   void keep_motion(bool goes_on);
   Pose as_predicted(Nanoseconds stamp_ns, const Pose& otherwise) const;
 
@@ -170,7 +171,8 @@ struct FusionGate::Impl {
   // --- what fusion/odometry rested on last
   enum class Carrier { kLio, kGps };
   std::optional<Odometry> last_raw;
-  std::deque<Odometry> recent_raw;  // up to last_raw: how the robot moves
+  std::deque<Odometry> recent_raw;   // up to last_raw: how the robot moves
+  std::deque<Odometry> recent_odom;  // the same as LIO tells it
   std::optional<Carrier> last_carrier;
   std::string last_gps_writer;  // of the GPS odometry that carried
   std::uint32_t last_epoch{0};

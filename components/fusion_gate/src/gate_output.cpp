@@ -17,8 +17,38 @@ constexpr double kDefaultFixInterval_s = 1.0;
 constexpr double kHighestSpeed_mps = 60.0;
 constexpr double kGpsStep_m = 0.5;  // a GPS filter was set anew: more than corrections at 5 Hz move
 
+/// What LIO's pose may differ from where the last ones led: corrections by scans, and a change of
+/// speed over half of what they tell of.
+constexpr double kLioStep_m = 0.02;
+constexpr double kLioChange_mps = 1.0;
+
 constexpr double kMotion_s = 0.5;       // over which the robot's motion is seen
 constexpr double kLeastMotion_s = 0.1;  // for less, the twist
+
+void keep(const Odometry& odometry, std::deque<Odometry>& recent) {
+  recent.push_back(odometry);
+  while (to_seconds(odometry.stamp_ns - recent.front().stamp_ns) > kMotion_s) {
+    recent.pop_front();
+  }
+}
+
+/// Where recent poses lead; nullopt when they are of too short a time.
+std::optional<Pose> led_on(const std::deque<Odometry>& recent, Nanoseconds stamp_ns) {
+  const double known_s =
+      recent.empty() ? 0.0 : to_seconds(recent.back().stamp_ns - recent.front().stamp_ns);
+  if (known_s < kLeastMotion_s) {
+    return std::nullopt;
+  }
+  const Pose& last = recent.back().T_frame_child;
+  const Pose& first = recent.front().T_frame_child;
+  const double share = to_seconds(stamp_ns - recent.back().stamp_ns) / known_s;
+  const Eigen::Vector3d turned_rad = so3_log(first.q.conjugate() * last.q);
+  // On an arc a chord lies half way between the headings at its ends.
+  const Eigen::Quaterniond past_to_coming_chord = so3_exp(0.5 * (1.0 + share) * turned_rad);
+  const Eigen::Vector3d moved_first_m = first.q.conjugate() * (last.p - first.p);
+  return Pose{(last.q * so3_exp(share * turned_rad)).normalized(),
+              last.p + share * (first.q * (past_to_coming_chord * moved_first_m))};
+}
 
 }  // namespace
 
@@ -119,9 +149,10 @@ void FusionGate::Impl::publish_lio(const Odometry& odometry, Output& out) {
   const Odometry in_map =
       fuse(with_covariance_in_local_map(odometry), lio->T_map_odom, lio->T_map_odom_covariance);
   const bool goes_on = last_carrier == Carrier::kLio && last_epoch == lio->odom_epoch;
-  const Pose unchanged = goes_on ? last_T_map_odom.pose() * odometry.T_frame_child
+  const Pose unchanged = goes_on ? last_T_map_odom.pose() * without_step(odometry)
                                  : as_predicted(odometry.stamp_ns, in_map.T_frame_child);
   keep_motion(goes_on);
+  keep(odometry, recent_odom);
   last_carrier = Carrier::kLio;
   last_epoch = lio->odom_epoch;
   last_T_map_odom = lio->T_map_odom;
@@ -144,11 +175,27 @@ void FusionGate::Impl::publish_gps(Output& out) {
   publish(base, goes_on ? base.T_frame_child : predicted, out);
 }
 
+/// LIO finds the robot elsewhere than it went when surfaces come into sight along an axis where
+/// there had been none. Such a step is no motion.
+Pose FusionGate::Impl::without_step(const Odometry& odometry) {
+  Pose pose = odometry.T_frame_child;
+  const std::optional<Pose> led = led_on(recent_odom, odometry.stamp_ns);
+  if (led) {
+    const double dt_s = to_seconds(odometry.stamp_ns - recent_odom.back().stamp_ns);
+    if ((pose.p - led->p).norm() > kLioStep_m + kLioChange_mps * dt_s) {
+      pose.p = led->p;
+      recent_odom.clear();
+    }
+  }
+  return pose;
+}
+
 /// Where another source carries on, or the same one was set anew, the way from its predecessor's
 /// pose to its own is no motion.
 void FusionGate::Impl::keep_motion(bool goes_on) {
   if (!goes_on) {
     recent_raw.clear();
+    recent_odom.clear();
   }
 }
 
@@ -159,20 +206,9 @@ Pose FusionGate::Impl::as_predicted(Nanoseconds stamp_ns, const Pose& otherwise)
     return otherwise;
   }
   const Pose& last = last_raw->T_frame_child;
-  const Pose& first = recent_raw.empty() ? last : recent_raw.front().T_frame_child;
   const double dt_s = to_seconds(stamp_ns - last_raw->stamp_ns);
-  const double known_s =
-      recent_raw.empty() ? 0.0 : to_seconds(last_raw->stamp_ns - recent_raw.front().stamp_ns);
-  if (known_s < kLeastMotion_s) {
-    return last * Pose{so3_exp(last_raw->angular_radps * dt_s), last_raw->linear_mps * dt_s};
-  }
-  const double share = dt_s / known_s;
-  const Eigen::Vector3d turned_rad = so3_log(first.q.conjugate() * last.q);
-  // On an arc a chord lies half way between the headings at its ends.
-  const Eigen::Quaterniond past_to_coming_chord = so3_exp(0.5 * (1.0 + share) * turned_rad);
-  const Eigen::Vector3d moved_first_m = first.q.conjugate() * (last.p - first.p);
-  return {(last.q * so3_exp(share * turned_rad)).normalized(),
-          last.p + share * (first.q * (past_to_coming_chord * moved_first_m))};
+  return led_on(recent_raw, stamp_ns)
+      .value_or(last * Pose{so3_exp(last_raw->angular_radps * dt_s), last_raw->linear_mps * dt_s});
 }
 
 void FusionGate::Impl::publish(const Odometry& odometry, const Pose& unchanged, Output& out) {
@@ -181,10 +217,7 @@ void FusionGate::Impl::publish(const Odometry& odometry, const Pose& unchanged, 
   }
   last_fused_ns = odometry.stamp_ns;
   last_raw = odometry;
-  recent_raw.push_back(odometry);
-  while (to_seconds(odometry.stamp_ns - recent_raw.front().stamp_ns) > kMotion_s) {
-    recent_raw.pop_front();
-  }
+  keep(odometry, recent_raw);
   out.fused_raw = odometry;
   out.fused = mode == Mode::kSmooth ? hand_over.follow(odometry, unchanged) : odometry;
 }

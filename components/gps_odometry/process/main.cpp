@@ -114,18 +114,24 @@ class Process {
   /// Only while the core wants it: other filters, and the gate that keeps the newest odometry of a
   /// filter that has died.
   void listen_to_others(bus::Loop& loop) {
-    const auto hear = [this, &loop](const nav_msgs::msg::Odometry& m,
-                                    const bus::MessageInfo& info) {
-      if (info.writer_guid != odometry_.guid()) {
-        loop.post(
-            [this, odometry = bus::from_message(m), writer = info.writer_guid] {
-              warm_start(others_.on_odometry(writer, odometry));
-            },
-            bus::WhenFull::kDropOldest);
-      }
+    using Hear = std::optional<gps_odometry::OtherFilters::Heard> (gps_odometry::OtherFilters::*)(
+        const std::string&, Odometry);
+    const auto hear = [this, &loop](Hear take_up) {
+      return
+          [this, &loop, take_up](const nav_msgs::msg::Odometry& m, const bus::MessageInfo& info) {
+            if (info.writer_guid != odometry_.guid()) {
+              loop.post(
+                  [this, take_up, odometry = bus::from_message(m), writer = info.writer_guid] {
+                    warm_start((others_.*take_up)(writer, odometry));
+                  },
+                  bus::WhenFull::kDropOldest);
+            }
+          };
     };
-    other_odometry_.emplace(participant_, topics::gps_odometry, hear);
-    selected_.emplace(participant_, topics::gps_selected, hear);
+    other_odometry_.emplace(
+        participant_, topics::gps_odometry, hear(&gps_odometry::OtherFilters::on_odometry));
+    selected_.emplace(
+        participant_, topics::gps_selected, hear(&gps_odometry::OtherFilters::on_selected));
     other_status_.emplace(
         participant_,
         topics::gps_status,
@@ -184,6 +190,7 @@ class Process {
     log_(output.events);
     publish_datum();
     if (output.odometry) {
+      others_.on_own_odometry(output.odometry->stamp_ns);
       odometry_.publish(bus::to_message(*output.odometry));
       keep([&] { session_->on_odometry(*output.odometry); });
     }

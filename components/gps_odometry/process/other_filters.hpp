@@ -27,6 +27,18 @@ class OtherFilters {
     return joined(said);
   }
 
+  /// What is published here: the gate hands it back.
+  void on_own_odometry(Nanoseconds stamp_ns) { own_since_ns_ = own_since_ns_.value_or(stamp_ns); }
+
+  /// What the gate follows or, from a filter that has died, keeps. From our first odometry on it
+  /// may be ours; a filter that lives is heard by itself.
+  std::optional<Heard> on_selected(const std::string& writer_guid, Odometry odometry) {
+    if (own_since_ns_ && odometry.stamp_ns >= *own_since_ns_) {
+      return std::nullopt;
+    }
+    return on_odometry(writer_guid, std::move(odometry));
+  }
+
   std::optional<Heard> on_datum_id(const std::string& writer_guid, const std::string& id) {
     Said& said = said_[bus::participant_of(writer_guid)];
     said.datum_id = id;
@@ -47,6 +59,7 @@ class OtherFilters {
   }
 
   std::map<std::string, Said> said_;
+  std::optional<Nanoseconds> own_since_ns_;
 };
 
 }  // namespace trigpoint::gps_odometry

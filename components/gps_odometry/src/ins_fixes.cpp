@@ -60,6 +60,7 @@ FixOutcome InsTracker::apply(InsTrack& track, const MapFix& fix) const {
     return {false, "before_imu", "Fix refused: there is no usable IMU sample yet."};
   }
   advance(track, fix.checked.stamp_ns);
+  watch_motion(track, fix);
   // A start from another filter's word that the very first fix contradicts was a wrong one.
   const bool wrong = is_unconfirmed(track) && !(judge(track.filter, fix).ratio[kHorizontal] <= 1.0);
   if (track.phase == Phase::kRunning &&

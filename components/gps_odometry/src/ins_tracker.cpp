@@ -32,6 +32,13 @@ constexpr double kSlowDecay = 1e6;        // an absorbed jump stays
 constexpr double kRestRate_radps = 0.01;
 constexpr double kRestForce_mps2 = 0.3;
 constexpr double kRestForceError_mps2 = 0.15;
+/// Of fixes that tell motion from rest: how far apart for a metre of sigma, within limits; how fast
+/// those of a receiver at rest wander, and by how much they scatter.
+constexpr double kTrailPerSigma_spm = 8.0;
+constexpr double kShortestTrail_s = 1.0;
+constexpr double kLongestTrail_s = 10.0;
+constexpr double kWander_mps = 0.1;
+constexpr double kScatter_sigmas = 4.0;
 constexpr double kRestSpeed_mps = 0.05;
 constexpr double kAligningSpeedSigma_mps = 1.0;
 constexpr double kUnknownYaw_rad = std::numbers::pi;
@@ -170,7 +177,38 @@ void InsTracker::apply(InsTrack& track, const CheckedImu& imu) const {
   }
 }
 
+/// Whether the receiver has gone farther, by fixes that are as many seconds apart as their sigmas
+/// ask for, than fixes of one at rest scatter and wander.
+void InsTracker::watch_motion(InsTrack& track, const MapFix& fix) const {
+  const TrailPoint now{fix.checked.stamp_ns,
+                       fix.antenna_map_m,
+                       fix.covariance_map_m2.diagonal().head<2>().maxCoeff()};
+  auto& [older, newer] = track.trail;
+  const double apart_s = std::clamp(
+      kTrailPerSigma_spm * std::sqrt(now.variance_m2), kShortestTrail_s, kLongestTrail_s);
+  if (newer.stamp_ns == 0) {
+    newer = now;
+  } else if (to_seconds(now.stamp_ns - newer.stamp_ns) >= apart_s) {
+    older = newer;
+    newer = now;
+  }
+  const double passed_s = to_seconds(now.stamp_ns - older.stamp_ns);
+  if (older.stamp_ns == 0 || passed_s <= 0.0) {
+    return;
+  }
+  const double moved_m = (now.antenna_map_m - older.antenna_map_m).head<2>().norm();
+  const double at_rest_m =
+      kWander_mps * passed_s + kScatter_sigmas * std::sqrt(now.variance_m2 + older.variance_m2);
+  if (moved_m > at_rest_m) {
+    track.moves_until_ns = now.stamp_ns + from_seconds(kShortestTrail_s);
+  }
+}
+
+/// An IMU on a smooth floor is as quiet at a steady speed as at rest: fixes that move tell.
 bool InsTracker::is_at_rest(const InsTrack& track, const QuietWindow& quiet) const {
+  if (track.imu_ns < track.moves_until_ns) {
+    return false;
+  }
   const Eskf18& filter = track.filter;
   const auto sigma = [&](int first) {
     return std::sqrt(filter.P.diagonal().segment<3>(first).maxCoeff());
@@ -338,6 +376,9 @@ void InsTracker::change_frame(InsTrack& track,
   track.aiding.prior_yaw_map_relative_rad += std::atan2(R_new_old(1, 0), R_new_old(0, 0));
   for (Contradiction& part : track.parts) {
     move(part.streak.last_map_m);
+  }
+  for (TrailPoint& point : track.trail) {
+    move(point.antenna_map_m);
   }
 }
 

@@ -26,6 +26,13 @@ struct Contradiction {
   Nanoseconds absorbed_ns{0};  ///< since when the error state holds a jump of the receiver; 0: no
 };
 
+/// Where the receiver was, by a fix of some seconds ago.
+struct TrailPoint {
+  Nanoseconds stamp_ns{0};  ///< 0: none yet
+  Eigen::Vector3d antenna_map_m{Eigen::Vector3d::Zero()};
+  double variance_m2{0.0};  ///< horizontal
+};
+
 struct InsTrack : Track {
   Eskf18 filter;
   ImuMean imu;  ///< the newest sample
@@ -45,6 +52,10 @@ struct InsTrack : Track {
   /// Who was right is open: held in what is published (m, per axis of map).
   Eigen::Vector3d doubt_m{Eigen::Vector3d::Zero()};
   Nanoseconds doubt_until_ns{0};
+
+  /// Two fixes of the way: the newer one takes the older one's place when it is old enough.
+  std::array<TrailPoint, 2> trail;
+  Nanoseconds moves_until_ns{0};  ///< by the fixes, however quiet the IMU
 };
 
 /// The rules by which measurements change an InsTrack.
@@ -119,6 +130,7 @@ class InsTracker {
   void clip(Judgement& judgement, Part part) const;
   void hold_doubt(InsTrack& track, const MapFix& fix, const Judgement& judgement) const;
   void accept(InsTrack& track, const MapFix& fix) const;
+  void watch_motion(InsTrack& track, const MapFix& fix) const;
   Eigen::Vector3d doubt_variance_m2(const InsTrack& track) const;
   Eigen::Vector3d added_variance_m2(const InsTrack& track) const;
 

@@ -267,6 +267,12 @@ void describe(Config& config, ConfigFields& fields) {
                             "share of the variance of the map's points across their planes that "
                             "position gathers, per metre: foliage is rougher than walls",
                             kNotNegative);
+                   f.number("blind_tilt_rad_sqrts",
+                            config.drift.blind_tilt_rad_sqrts,
+                            "sigma of roll and of pitch against gravity after one second, while "
+                            "scans do not hold the position along the axis into which gravity "
+                            "would then accelerate: 5 mrad in 10 s",
+                            kNotNegative);
                  });
   fields.section("rows", "GPS rows from the gate", [&](ConfigFields& f) {
     f.number("history_s", config.rows.history_s, "how late a row may come", kPositive);

@@ -5,6 +5,7 @@
 #include "trigpoint/base/so3.hpp"
 
 #include "downsample.hpp"
+#include "drift.hpp"
 
 #include <algorithm>
 #include <cmath>

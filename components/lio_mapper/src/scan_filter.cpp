@@ -4,7 +4,9 @@
 
 #include "trigpoint/base/so3.hpp"
 
+#include "bent_map.hpp"
 #include "downsample.hpp"
+#include "drift.hpp"
 #include "scan_matcher.hpp"
 #include "undistortion.hpp"
 #include <Eigen/Cholesky>
@@ -29,14 +31,6 @@ constexpr double kLeastMotion_m = 0.005;
 /// Of a pose that a search found, before the scan is matched there.
 constexpr double kFoundPosition_m = 0.1;
 constexpr double kFoundRotation_rad = 0.01;
-/// What is larger stays the same error for long, as in a tunnel, and is the pose's own: passed on
-/// every metre it would leave the pose nothing to learn from GPS.
-constexpr double kMostInherited_m = 0.1;
-constexpr double kMostInherited_rad = 0.01;
-/// Planes as thin as this are as thin as range noise lets them be, ...
-constexpr double kSmooth_m = 0.01;
-/// ... and what a thicker one displaces at this distance turns the pose.
-constexpr double kLever_m = 10.0;
 /// A sweep of a guessed motion that was wrong by more at its end is undistorted anew: a smear of
 /// range noise, at 10 m.
 constexpr double kSmear_m = 0.02;
@@ -113,58 +107,6 @@ PointCloud transformed(const PointCloud& points, const Pose& T) {
   return moved;
 }
 
-DriftRate drift_rate(const DriftConfig& drift, const Matrix6d& local, double roughness2_m2) {
-  const double inherited = drift.map_renewal_per_m;
-  const auto square = [](double x) { return x * x; };
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> axes(local.topLeftCorner<3, 3>());
-  const Matrix3d position_m2 =
-      axes.eigenvectors() *
-      axes.eigenvalues().cwiseMax(0.0).cwiseMin(square(kMostInherited_m)).asDiagonal() *
-      axes.eigenvectors().transpose();
-  const double most_rad2 = square(kMostInherited_rad);
-  DriftRate rate;
-  const double rough_m2 = drift.roughness_per_m * std::max(0.0, roughness2_m2 - square(kSmooth_m));
-  const double everywhere_m2 = square(drift.position_sigma_m_sqrtm) + rough_m2;
-  rate.position_m2 = everywhere_m2 * Matrix3d::Identity() + inherited * position_m2;
-  const double rough_rad2 = rough_m2 / square(kLever_m);
-  const Eigen::Matrix2d tilt_rad2 = local.block<2, 2>(3, 3);
-  rate.tilt_rad2 =
-      (square(drift.tilt_sigma_rad_sqrtm) + rough_rad2) * Eigen::Matrix2d::Identity() +
-      inherited * std::min(most_rad2, tilt_rad2.trace()) * tilt_rad2 / (tilt_rad2.trace() + 1e-18);
-  rate.yaw_rad2 =
-      square(drift.yaw_sigma_rad_sqrtm) + rough_rad2 + inherited * std::min(most_rad2, local(5, 5));
-  return rate;
-}
-
-Matrix4d drift_noise(const DriftRate& rate,
-                     double distance_m,
-                     const Matrix3d& R_frame_odom,
-                     const Vector3d& p_odom_m) {
-  Eigen::Vector4d turn = Eigen::Vector4d::UnitX();
-  turn.tail<3>() = -Vector3d::UnitZ().cross(R_frame_odom * p_odom_m);
-  Matrix4d noise = rate.yaw_rad2 * distance_m * turn * turn.transpose();
-  noise.bottomRightCorner<3, 3>() +=
-      distance_m * R_frame_odom * rate.position_m2 * R_frame_odom.transpose();
-  return noise;
-}
-
-void add_drift_noise(const DriftRate& rate,
-                     double distance_m,
-                     const State& state,
-                     bool aligned,
-                     ErrorMatrix& covariance) {
-  Eigen::Matrix<double, error::kSize, 2> tilt = Eigen::Matrix<double, error::kSize, 2>::Zero();
-  tilt.middleRows<2>(error::kGravity).setIdentity();
-  if (aligned) {
-    const Vector3d& p_odom_m = state.T_odom_base.p;
-    tilt.middleRows<3>(error::kPositionMapOdom) = -placed_point_by_gravity(state, p_odom_m);
-    covariance.block<4, 4>(error::kYawMapOdom, error::kYawMapOdom) +=
-        drift_noise(rate, distance_m, state.placement().pose().q.toRotationMatrix(), p_odom_m);
-  }
-  // The gravity errors turn about odom's x and y as long as odom is nearly level.
-  covariance += distance_m * tilt * rate.tilt_rad2 * tilt.transpose();
-}
-
 ScanFilter::ScanFilter(const Config& config,
                        const Pose& T_base_lidar,
                        const InitialState& initial,
@@ -237,6 +179,7 @@ UpdateResult ScanFilter::update(const Prediction& prediction, ScanMatcher& match
   const auto timed = [&](const auto& linearise) {
     begin(Stage::kMatch);
     auto information = linearise();
+    doubt_bent_map(prediction.covariance, information);
     begin(Stage::kSolve);
     return information;
   };
@@ -267,6 +210,7 @@ UpdateResult ScanFilter::match(const Prediction& prediction,
   outcome.used = result.used;
   if (result.used && result.measured.weight_per_m2 > 0.0) {
     roughness2_m2_ = result.measured.weighted_thickness2 / result.measured.weight_per_m2;
+    blind_ = blindness(result.measured.information.topLeftCorner<3, 3>());
   }
   outcome.matches = result.count;
   outcome.iterations = result.iterations;
@@ -367,6 +311,12 @@ ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu, const 
   begin(Stage::kPredict);
   Prediction prediction = predict(sweep, imu);
   add_drift(prediction);
+  add_blind_tilt_noise(config_.drift,
+                       to_seconds(sweep.end_ns - stamp_ns()),
+                       blind_,
+                       prediction.state,
+                       aligned_,
+                       prediction.covariance);
 
   ScanOutcome outcome;
   shape(sweep, prediction, outcome);

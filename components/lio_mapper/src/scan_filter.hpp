@@ -155,42 +155,12 @@ class ScanFilter {
   bool aligned_{false};
   double distance_m_{0.0};
   Eigen::Vector3d pruned_at_m_{Eigen::Vector3d::Zero()};
-  double roughness2_m2_{0.0};                    ///< of the planes that the last usable scan met
+  double roughness2_m2_{0.0};  ///< of the planes that the last usable scan met
+  /// Of the last usable scan, see drift.hpp.
+  Eigen::Matrix3d blind_{Eigen::Matrix3d::Zero()};
   Matrix6d drift_covariance_{Matrix6d::Zero()};  ///< of odom, about its origin, ROS order
 };
 
 PointCloud transformed(const PointCloud& points, const Pose& T);
-
-/// Variances that odom's drift gathers over a metre, axes of odom.
-struct DriftRate {
-  Eigen::Matrix3d position_m2{Eigen::Matrix3d::Zero()};
-  Eigen::Matrix2d tilt_rad2{Eigen::Matrix2d::Zero()};
-  double yaw_rad2{0.0};
-};
-
-/// The configured walk, and what the map inherits. New map is laid with the error that the pose has
-/// relative to the old map, so over the length on which the map is renewed its covariance (ROS
-/// order) is passed on once. What is no plane, as foliage, looks different from every place:
-/// neighbouring scans share that error, so it does not average out within a scan, but over the
-/// metres. It goes with the variance of the map's points across their planes.
-DriftRate drift_rate(const DriftConfig& drift,
-                     const Matrix6d& pose_covariance_in_local_map = Matrix6d::Zero(),
-                     double roughness2_m2 = 0.0);
-
-/// Covariance that the drift of heading and position at `p_odom_m` adds to a transform
-/// (yaw, x, y, z) from odom into a frame turned by `R_frame_odom`: the heading turns about the
-/// robot, not about the origin of odom.
-Eigen::Matrix4d drift_noise(const DriftRate& rate,
-                            double distance_m,
-                            const Eigen::Matrix3d& R_frame_odom,
-                            const Eigen::Vector3d& p_odom_m);
-
-/// Adds to `covariance` what odom may drift against map over `distance_m`: the noise above and a
-/// tilt, which likewise turns odom about the robot. Before the alignment only the tilt.
-void add_drift_noise(const DriftRate& rate,
-                     double distance_m,
-                     const State& state,
-                     bool aligned,
-                     ErrorMatrix& covariance);
 
 }  // namespace trigpoint::lio_mapper

@@ -2,10 +2,8 @@
 // Copyright the Trigpoint developers
 #include "scan_matcher.hpp"
 
-#include "voxel_key.hpp"
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
-#include <tsl/robin_map.h>
 
 #include <algorithm>
 #include <cmath>
@@ -20,24 +18,10 @@ namespace {
 /// A point that moved less sees the same plane.
 constexpr double kRematch_m = 0.05;
 constexpr double kLeastRange_m = 1e-3;
-/// Surfaces that leave the pose less certain than this are not enough: among walls they leave 5 mm
-/// and 0.6 mrad, among trees 13 mm.
-constexpr double kOpenPosition_m = 0.01;
-constexpr double kOpenRotation_rad = 2e-3;
-constexpr double kLeastInformation = 1e-3;  // of directions that no residual sees
-/// By so much a scan is displaced to see whether it is pulled back: within this other points become
-/// the nearest, and surfaces are still found.
-constexpr double kDisplaced_m = 0.25;
-/// So many points tell that.
-constexpr std::size_t kDisplacedPoints = 1000;
-/// A share of the information that is less certain than this many sigmas is none.
-constexpr double kCertainShare_sigmas = 2.0;
 /// FAST-LIO2's acceptance 1 - 0.9 |r| / sqrt(range) > 0.9: near points must fit more closely.
 constexpr double kGatePerRootRange = 1.0 / 9.0;
 /// Planes of few points look thinner than they are.
 constexpr double kLeastVariance_m2 = 0.01 * 0.01;
-/// Points that one thread takes at a time.
-constexpr std::size_t kBlock = 256;
 
 /// E[n n^T] of a normal whose direction has variance tilt2 exceeds the true one by this.
 void add_noise(const Vector3d& normal, double weighted_tilt2, Eigen::Matrix3d& noise) {
@@ -108,18 +92,13 @@ void allow_for_scatter(const typename Information<Size>::Matrix& scatter,
                        Information<Size>& sum) {
   using Matrix = typename Information<Size>::Matrix;
   // What no residual sees scatters as the root says, neither more nor less.
-  const Matrix half =
-      root.matrixL().solve((scatter + kLeastInformation * Matrix::Identity()).eval());
+  const Matrix half = root.matrixL().solve((scatter + kUnseen * Matrix::Identity()).eval());
   const Matrix times_stated = root.matrixL().solve(half.transpose());
   const Eigen::SelfAdjointEigenSolver<Matrix> eigen(times_stated);
   const Matrix directions = root.matrixL() * eigen.eigenvectors();
   sum.information = directions * eigen.eigenvalues().cwiseMax(least).cwiseInverse().asDiagonal() *
                     directions.transpose();
   sum.gradient = -(sum.information * step).eval();
-}
-
-std::size_t blocks_of(std::size_t count) {
-  return (count + kBlock - 1) / kBlock;
 }
 
 }  // namespace
@@ -143,21 +122,7 @@ ScanMatcher::ScanMatcher(const PointCloud& points_base,
     r.range_m = beam_m.norm();
     r.direction_base = beam_m / std::max(r.range_m, kLeastRange_m);
   }
-  number_patches();
-}
-
-/// Points out of the index's range, which no LiDAR reaches, are one patch.
-void ScanMatcher::number_patches() {
-  const double per_m = 1.0 / config_.patch_m;
-  tsl::robin_map<VoxelKey, std::uint32_t, VoxelKeyHash> numbers;
-  for (Residual& r : residuals_) {
-    const Vector3d& p = r.point_base_m;
-    const VoxelKey key = voxel_index_fits(p.x(), p.y(), p.z(), per_m)
-                             ? voxel_key(voxel_index(p.x(), p.y(), p.z(), per_m))
-                             : ~VoxelKey{0};
-    r.patch = numbers.try_emplace(key, static_cast<std::uint32_t>(numbers.size())).first->second;
-  }
-  patches_.resize(numbers.size());
+  patches_.resize(number_cubes(config_.patch_m, &Residual::patch));
 }
 
 /// With a residual in them.
@@ -204,20 +169,6 @@ void ScanMatcher::refresh(std::size_t i, const Viewpoint& view, const MapOrigins
   if (origins != nullptr && found_[i] == Found::kPlane && (!kept || ask_nearest)) {
     r.origin = origins->find(r.looked_up_at_odom_m);
   }
-}
-
-/// Whether surfaces alone leave the pose so uncertain that dearer matches are worth it, as in
-/// foliage.
-bool ScanMatcher::leaves_pose_open(const Matrix6d& information) {
-  const Matrix6d covariance =
-      (information + kLeastInformation * Matrix6d::Identity()).llt().solve(Matrix6d::Identity());
-  const auto largest = [&](int at) {
-    return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance.block<3, 3>(at, at),
-                                                          Eigen::EigenvaluesOnly)
-        .eigenvalues()[2];
-  };
-  return largest(error::kPosition) > kOpenPosition_m * kOpenPosition_m ||
-         largest(error::kRotation) > kOpenRotation_rad * kOpenRotation_rad;
 }
 
 double ScanMatcher::variance_m2(const Residual& r, double cos_incidence) const {
@@ -285,25 +236,13 @@ PoseAndExtrinsicInformation::Vector ScanMatcher::row_of<error::kPoseAndExtrinsic
   return h;
 }
 
-/// Block by block, so that sums of blocks that are added in order have the same rounding on any
-/// number of threads.
-template <typename Visit>
-void ScanMatcher::in_blocks(const Visit& visit) {
-  workers_.run(blocks_of(residuals_.size()), [&](std::size_t block) {
-    const std::size_t end = std::min((block + 1) * kBlock, residuals_.size());
-    for (std::size_t i = block * kBlock; i < end; ++i) {
-      visit(block, i);
-    }
-  });
-}
-
 /// sum w^2 r^2 h h^T with the residuals r after `step` from where they were linearised.
 template <int Size>
 typename Information<Size>::Matrix ScanMatcher::scatter_after(
     const typename Information<Size>::Vector& step,
     Scratch<Size>& scratch) {
   using Matrix = typename Information<Size>::Matrix;
-  scratch.sums.assign(blocks_of(residuals_.size()), {});
+  scratch.sums.assign(blocks(), {});
   in_blocks([&](std::size_t block, std::size_t i) {
     if (found_[i] == Found::kPlane) {
       const typename Information<Size>::Vector& h = scratch.rows[i];
@@ -322,7 +261,7 @@ template <int Size>
 Information<Size> ScanMatcher::sum_of_all(const Viewpoint& view,
                                           const MapOrigins* origins,
                                           Scratch<Size>& scratch) {
-  scratch.sums.assign(blocks_of(residuals_.size()), {});
+  scratch.sums.assign(blocks(), {});
   scratch.rows.resize(residuals_.size());
   in_blocks([&](std::size_t block, std::size_t i) {
     refresh(i, view, origins);
@@ -355,15 +294,18 @@ Information<Size> ScanMatcher::weighed(Information<Size> sum,
     return sum;
   }
   using Matrix = typename Information<Size>::Matrix;
-  const Matrix by = noise_free_share(sum, pulled_back_);
-  const Eigen::LLT<Matrix> root(sum.information + kLeastInformation * Matrix::Identity());
+  const Matrix by = noise_free_share(sum, open_.pulled_back);
+  Matrix root_trust = Matrix::Identity();
+  root_trust.template topLeftCorner<3, 3>() = open_.root_trust;
+  const Eigen::LLT<Matrix> root(sum.information + kUnseen * Matrix::Identity());
   const typename Information<Size>::Vector step = -root.solve(sum.gradient);
   allow_for_scatter(scatter_after(step, scratch), root, step, least_scatter, sum);
   const auto most = static_cast<std::size_t>(config_.max_patches);
   const double scale =
       static_cast<double>(std::min(count_patches(), most)) / static_cast<double>(sum.count);
-  sum.information = (scale * by * sum.information * by).eval();
-  sum.gradient = (scale * by * sum.gradient).eval();
+  const Matrix both = root_trust * by;
+  sum.information = (scale * both * sum.information * both.transpose()).eval();
+  sum.gradient = (scale * root_trust * both * sum.gradient).eval();
   sum.noise *= scale;
   return sum;
 }
@@ -382,80 +324,13 @@ Information<Size> ScanMatcher::linearise_all(const Viewpoint& view,
           residuals_.begin(), residuals_.end(), [](const Residual& r) { return r.is_of_nearest; });
       if (any_nearest) {
         const auto promised = weighed(sum, 1.0, scratch);
-        pulled_back_ = share_pulled_back(view, promised.information.template topLeftCorner<3, 3>());
+        judge_open_axes(view, promised.information.template topLeftCorner<3, 3>());
       }
     }
   }
   // A plane of the few points nearest to one that is matched goes through them whatever their
   // noise: that residuals against such planes are small is no witness.
   return weighed(sum, also_nearest_ ? 1.0 : share_of_map(sum), scratch);
-}
-
-/// Pull along `axis` of the scan displaced to `view`, all matches sought anew.
-ScanMatcher::Pull ScanMatcher::pull_at(const Viewpoint& view, const Vector3d& axis) {
-  std::vector<Pull> sums(blocks_of(residuals_.size()));
-  const std::size_t every = residuals_.size() / kDisplacedPoints + 1;
-  in_blocks([&](std::size_t block, std::size_t i) {
-    if (i % every != 0) {
-      return;
-    }
-    Residual r = residuals_[i];
-    r.looked_up_at_odom_m = view.R_odom_base * r.point_base_m + view.T_odom_base.p;
-    Found found = look_up(&LocalMap::match_surface, r);
-    if (found == Found::kNothing) {
-      found = look_up(&LocalMap::match_nearest, r);
-    }
-    if (found == Found::kNothing) {
-      return;
-    }
-    const double h = r.plane.normal.dot(axis);
-    // Off a wall, as it is displaced, a point has a large residual and is no outlier.
-    const double residual_m = std::exchange(r.residual_m, 0.0);
-    weigh(r, (view.R_odom_base * r.direction_base).dot(r.plane.normal));
-    const double pull = r.weight * residual_m * h;
-    const double promised = r.weight * h * h;
-    sums[block] += {pull, promised, pull * pull, pull * promised, promised * promised};
-  });
-  Pull sum;
-  for (const Pull& part : sums) {
-    sum += part;
-  }
-  return sum;
-}
-
-/// Where surfaces are volumes, as crowns are, or planes lie as chance and the rings' pattern lay
-/// them, a scan that is moved finds other planes beside each point and is content: residuals that
-/// are linearised promise a pull back that does not come, and hold the estimate at its prediction.
-/// (Asked only where nearest points were matched: surfaces alone are held to be some.) Along each
-/// axis that is open: by how much of what A promises the gradient really changes between two
-/// displaced places, the secant f A in place of the tangent A. The solution is then g / (f A), with
-/// the information f^2 A, as for noisy normals.
-Eigen::Matrix3d ScanMatcher::share_pulled_back(const Viewpoint& view,
-                                               const Eigen::Matrix3d& information) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(information);
-  Eigen::Matrix3d share = Eigen::Matrix3d::Zero();
-  for (int i = 0; i < 3; ++i) {
-    const Vector3d axis = axes.eigenvectors().col(i);
-    double along = 1.0;
-    const double promised_here = axes.eigenvalues()[i];
-    if (promised_here > kLeastInformation &&
-        promised_here < 1.0 / (kOpenPosition_m * kOpenPosition_m)) {
-      Viewpoint ahead = view;
-      Viewpoint behind = view;
-      ahead.T_odom_base.p += kDisplaced_m * axis;
-      behind.T_odom_base.p -= kDisplaced_m * axis;
-      const Pull a = pull_at(ahead, axis);
-      const Pull b = pull_at(behind, axis);
-      const double promised = kDisplaced_m * (a.information + b.information) + 1e-12;
-      const double f = (a.gradient - b.gradient) / promised;
-      // What single points pull beside f.
-      const double scatter =
-          std::max(0.0, a.scatter_about(f * kDisplaced_m) + b.scatter_about(-f * kDisplaced_m));
-      along = std::clamp(f - kCertainShare_sigmas * std::sqrt(scatter) / promised, 0.0, 1.0);
-    }
-    share += along * axis * axis.transpose();
-  }
-  return share;
 }
 
 PoseInformation ScanMatcher::linearise(const Pose& T_odom_base) {

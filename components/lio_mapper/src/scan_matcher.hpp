@@ -11,11 +11,15 @@
 #include "workers.hpp"
 #include <Eigen/Core>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
 namespace trigpoint::lio_mapper {
+
+/// Information of directions that no residual sees, where an inverse is asked for.
+inline constexpr double kUnseen = 1e-3;
 
 /// Residuals of one scan against the planes of a local map: r = n . (R p + t) + d, FAST-LIO2
 /// eq. 12. Sums the normal equations directly while it goes through the points.
@@ -45,6 +49,9 @@ class ScanMatcher {
   double share_within(double distance_m) const;
 
  private:
+  /// Points that one thread takes at a time.
+  static constexpr std::size_t kBlock = 256;
+
   struct Residual {
     Eigen::Vector3d point_base_m;
     Eigen::Vector3d direction_base;  ///< of the beam
@@ -57,6 +64,7 @@ class ScanMatcher {
     const MapOrigin* origin;  ///< of the plane; null: unknown, or not asked for
     bool is_of_nearest{false};
     std::uint32_t patch;  ///< which cube of matching.patch_m it lies in
+    std::uint32_t cell;   ///< which smaller one; set where an axis is open
   };
 
   /// What is put in front of the residuals of one linearisation.
@@ -74,27 +82,22 @@ class ScanMatcher {
     std::vector<typename Information<Size>::Vector> rows;  ///< of residuals
   };
 
-  /// Of a displaced scan along an axis, sums over its points: w r h, w h h, and their products.
+  /// What a patch of a scan that is displaced by d pulls it back, and what A promises: sums of
+  /// w r h d and of w h h d d over its points.
   struct Pull {
-    double gradient{0.0};
-    double information{0.0};
-    double gradient2{0.0};
-    double both{0.0};
-    double information2{0.0};
+    double back{0.0};
+    double promised{0.0};
+  };
 
-    Pull& operator+=(const Pull& other) {
-      gradient += other.gradient;
-      information += other.information;
-      gradient2 += other.gradient2;
-      both += other.both;
-      information2 += other.information2;
-      return *this;
-    }
+  struct Share {
+    double share;
+    double sigma;
+  };
 
-    /// Variance of the gradient, when all residuals were expected to be `displaced_m` h.
-    double scatter_about(double displaced_m) const {
-      return gradient2 - 2.0 * displaced_m * both + displaced_m * displaced_m * information2;
-    }
+  /// Matrices over odom's axes; the identity along those that are not open.
+  struct OpenAxes {
+    Eigen::Matrix3d pulled_back{Eigen::Matrix3d::Identity()};  ///< share of the promised pull
+    Eigen::Matrix3d root_trust{Eigen::Matrix3d::Identity()};   ///< root of the share believed
   };
 
   using Ask = bool (LocalMap::*)(const Eigen::Vector3d&, PlaneMatch&) const;
@@ -112,10 +115,18 @@ class ScanMatcher {
   template <int Size>
   typename Information<Size>::Matrix scatter_after(const typename Information<Size>::Vector& step,
                                                    Scratch<Size>& scratch);
-  Pull pull_at(const Viewpoint& view, const Eigen::Vector3d& axis_odom);
-  Eigen::Matrix3d share_pulled_back(const Viewpoint& view, const Eigen::Matrix3d& information);
-  void number_patches();
+  void add_pulls(Viewpoint view,
+                 const Eigen::Vector3d& axis_odom,
+                 double displaced_m,
+                 std::vector<Pull>& by_patch);
+  static Share share_of(const std::vector<Pull>& by_patch);
+  double trust_in(const Eigen::Vector3d& axis_odom, std::size_t cells) const;
+  void judge_open_axes(const Viewpoint& view, const Eigen::Matrix3d& information);
+  std::size_t number_cubes(double side_m, std::uint32_t Residual::*number);
   std::size_t count_patches();
+
+  std::size_t blocks() const { return (residuals_.size() + kBlock - 1) / kBlock; }
+
   template <typename Visit>
   void in_blocks(const Visit& visit);
   template <int Size>
@@ -136,12 +147,24 @@ class ScanMatcher {
   Workers& workers_;
   bool judged_{false};  ///< whether surfaces are enough for this scan
   bool also_nearest_{false};
-  Eigen::Matrix3d pulled_back_{Eigen::Matrix3d::Identity()};  ///< see share_pulled_back
+  OpenAxes open_;
   std::vector<Residual> residuals_;  ///< one a point, also where none was found
   std::vector<Found> found_;
   std::vector<std::uint8_t> patches_;  ///< whether a residual lies in it
   Scratch<error::kPose> scratch_;
   Scratch<error::kPoseAndExtrinsic> scratch_with_extrinsic_;
 };
+
+/// Block by block, so that sums of blocks that are added in order have the same rounding on any
+/// number of threads.
+template <typename Visit>
+void ScanMatcher::in_blocks(const Visit& visit) {
+  workers_.run(blocks(), [&](std::size_t block) {
+    const std::size_t end = std::min((block + 1) * kBlock, residuals_.size());
+    for (std::size_t i = block * kBlock; i < end; ++i) {
+      visit(block, i);
+    }
+  });
+}
 
 }  // namespace trigpoint::lio_mapper

@@ -13,14 +13,45 @@ namespace trigpoint::recording {
 
 namespace {
 
+/// Messages are put in order and played by their times of receiving; throws LogError when the log
+/// has none.
+void require_receive_times(const LogSummary& log) {
+  std::uint64_t messages = 0;
+  for (const TopicSummary& topic : log.topics) {
+    messages += topic.messages;
+  }
+  if (messages > 1 && log.first_ns == log.last_ns) {
+    throw LogError(log.path + ": all " + std::to_string(messages) +
+                   " messages are stored as received at " +
+                   std::to_string(to_seconds(log.first_ns)) +
+                   " s: what wrote the log did not set the times of receiving, by which messages "
+                   "are put in order. Write it anew with them (log_time in MCAP, timestamp in "
+                   "rosbag2's database); the stamp of a message's header will do");
+  }
+}
+
+/// With what is wrong with the times of receiving of some messages.
+LogSummary judged(LogSummary log) {
+  if (log.first_ns == 0 && log.last_ns > 0) {
+    log.faults.push_back(log.path +
+                         ": messages are stored as received at 0 s, others later: the log seems to "
+                         "last " +
+                         std::to_string(to_seconds(log.last_ns)) +
+                         " s, and log.start_s and log.duration_s count from 0 s");
+  }
+  return log;
+}
+
 class BagReader : public LogReader {
  public:
   BagReader(std::unique_ptr<BagSource> source, TopicChoice topics)
-      : source_(std::move(source)), topics_(std::move(topics)) {
+      : source_(std::move(source)),
+        topics_(std::move(topics)),
+        summary_(judged(source_->summary())) {
     source_->select({topics_.points, topics_.imu, topics_.fix, topics_.twist, topics_.yaw});
   }
 
-  const LogSummary& summary() const override { return source_->summary(); }
+  const LogSummary& summary() const override { return summary_; }
 
   std::optional<LogEntry> next() override {
     if (second_) {
@@ -125,6 +156,7 @@ class BagReader : public LogReader {
 
   std::unique_ptr<BagSource> source_;
   TopicChoice topics_;
+  LogSummary summary_;
   SkippedMessages skipped_;
   std::optional<LogEntry> second_;                ///< of the same message
   std::map<std::string, std::uint64_t> numbers_;  ///< messages so far, by topic
@@ -137,6 +169,7 @@ std::unique_ptr<LogReader> read_bag(std::unique_ptr<BagSource> source,
                                     const RobotConfig& robot,
                                     const LogOptions& options) {
   TopicChoice topics = choose_topics(source->summary(), robot, options);
+  require_receive_times(source->summary());
   return std::make_unique<BagReader>(std::move(source), std::move(topics));
 }
 

@@ -133,6 +133,28 @@ TEST(Config, a_missing_file_is_named) {
   }
 }
 
+TEST(RobotConfig, names_the_topics_without_which_there_is_nothing_to_do) {
+  const auto error_of_robot = [](const std::string& yaml) -> std::string {
+    RobotConfig robot;
+    try {
+      load_config_text("robot: {" + yaml + "}", "file.yaml", [&](ConfigFields& fields) {
+        fields.section("robot", "", [&](ConfigFields& section) { describe(robot, section); });
+      });
+    } catch (const ConfigError& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  for (const char* topic : {"points_topic", "imu_topic", "fix_topic"}) {
+    for (const char* empty : {"''", "'  '", "/"}) {
+      EXPECT_THAT(error_of_robot(std::string(topic) + ": " + empty),
+                  HasSubstr(std::string("robot.") + topic + " must name a topic"))
+          << empty;
+    }
+  }
+  EXPECT_EQ(error_of_robot("twist_topic: '', yaw_topic: '', points_topic: /points"), "no error");
+}
+
 TEST(RobotConfig, the_lidar_s_pose_follows_from_its_angles) {
   RobotConfig robot;
   robot.lidar_position_base_m = {0.5, 0.0, 1.0};

@@ -72,7 +72,9 @@ TEST(Input, that_does_not_exist_is_named) {
 
 TEST(Input, of_a_scenario_brings_its_robot_its_datum_and_its_truth) {
   const ScratchFolder folder;
-  const Input input = open_input(of("short"), folder.file("session/truth.tum"));
+  const Input input = open_input(of("short"));
+  EXPECT_FALSE(std::filesystem::exists(folder.file("session")));
+  leave_truth(input, folder.file("session"));
   const auto scenario = simulator::load_scenario("short");
   EXPECT_EQ(input.config.cores.robot.antenna_position_base_m,
             scenario.robot.antenna_position_base_m);
@@ -103,14 +105,6 @@ TEST(Input, refuses_a_mode_that_there_is_not) {
   options.mode = "gentle";
   EXPECT_THAT(error_of([&] { load_config_of(options); }),
               AllOf(HasSubstr("--mode"), HasSubstr("gentle"), HasSubstr("hard")));
-}
-
-TEST(Input, with_a_wrong_configuration_writes_no_truth) {
-  const ScratchFolder folder;
-  InputOptions options = of("short");
-  options.mode = "gentle";
-  EXPECT_NE(error_of([&] { open_input(options, folder.file("session/truth.tum")); }), "");
-  EXPECT_FALSE(std::filesystem::exists(folder.file("session")));
 }
 
 TEST(UsedFolder, is_refused_and_an_empty_or_new_one_is_not) {

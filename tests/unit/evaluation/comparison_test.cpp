@@ -184,6 +184,39 @@ TEST(Comparison, of_a_session_names_what_it_left_out) {
                     Contains(HasSubstr("No error of gps.tum"))));
 }
 
+TEST(Comparison, of_a_session_tells_a_value_of_its_configuration_that_is_no_number) {
+  const TemporaryFolder folder;
+  test::make_session(folder.path("s"));
+  tests::write_file(folder.path("s") + "/config.yaml",
+                    "robot:\n  geoid_undulation_m: [30]\n  antenna_position_base_m: [0, 0, 0]\n");
+  EXPECT_THAT(compare({folder.path("s"), "", "", ""}).damaged,
+              testing::ElementsAre(
+                  HasSubstr("config.yaml: robot.geoid_undulation_m must be a number; is [30]")));
+}
+
+TEST(Comparison, is_drawn_with_the_names_of_what_was_left_out) {
+  if (!std::filesystem::exists("/usr/bin/gnuplot")) {
+    GTEST_SKIP() << "gnuplot is not installed";
+  }
+  const TemporaryFolder folder;
+  test::make_session(folder.path("s"));
+  const auto scripts = [&](const std::string& pictures) {
+    std::vector<std::string> texts;
+    for (const std::string& png :
+         draw(compare({folder.path("s"), "", "", ""}), folder.path(pictures))) {
+      const std::filesystem::path path(png);
+      texts.push_back(
+          tests::read_file(folder.path(pictures) + "/plots/" + path.stem().string() + ".gp"));
+    }
+    return texts;
+  };
+  EXPECT_THAT(scripts("whole"), testing::Each(testing::Not(HasSubstr("Left out"))));
+  tests::write_file(folder.path("s") + "/gps.tum", "nonsense\n");
+  EXPECT_THAT(scripts("damaged"),
+              AllOf(testing::Not(testing::IsEmpty()),
+                    testing::Each(HasSubstr("'Left out, cannot be read: gps.tum'"))));
+}
+
 TEST(Comparison, of_a_file_with_nothing_is_wrong_usage) {
   const TemporaryFolder folder;
   test::make_session(folder.path("s"));

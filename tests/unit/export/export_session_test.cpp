@@ -12,6 +12,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace trigpoint::exporter {
@@ -231,6 +232,27 @@ TEST_F(ExportSession, writes_no_sixtieth_second) {
   EXPECT_THAT(read_all(out("trajectories.geojson")), HasSubstr("2023-11-14T22:14:00Z"));
 }
 
+TEST_F(ExportSession, dates_the_files_in_the_archive_by_the_end_of_the_drive) {
+  {
+    TrajectoryWriter fused(path_in(session(), session_file::kFused), "base_link in map");
+    fused.append(1'700'000'040'000'000'000, Pose{});
+    fused.append(1'700'000'045'123'400'000, Pose{});  // 2023-11-14 22:14:05
+  }
+  write_datum(path_in(session(), session_file::kDatum), {43.9, -78.9, 100.0});
+  export_session(session(), out(), {{"kmz"}});
+  const std::string zip = read_all(out("session.kmz"));
+  const unsigned time = (22U << 11U) | (14U << 5U) | (5U / 2U);
+  const unsigned date = ((2023U - 1980U) << 9U) | (11U << 5U) | 14U;
+  std::string stamp;
+  for (const unsigned number : {time, date}) {
+    stamp += {static_cast<char>(number & 0xFFU), static_cast<char>(number >> 8U)};
+  }
+  const std::size_t directory = zip.find("PK\1\2");
+  ASSERT_NE(directory, std::string::npos);
+  EXPECT_EQ(zip.substr(10, 4), stamp) << "of the first entry itself";
+  EXPECT_EQ(zip.substr(directory + 12, 4), stamp) << "in the directory";
+}
+
 TEST_F(ExportSession, names_the_file_that_the_disk_had_no_room_for_and_leaves_no_part_of_it) {
   PointCloud cloud;
   for (int i = 0; i < 20'000; ++i) {
@@ -313,11 +335,72 @@ TEST_F(ExportSession, names_the_configuration_that_cannot_be_read) {
   }
 }
 
+TEST_F(ExportSession, tells_a_value_of_the_configuration_that_cannot_be_taken) {
+  const auto error_with = [&](const std::string& text) {
+    write_all(path_in(session(), session_file::kConfig), text);
+    return error_of([&] { past_settings_of(session()); });
+  };
+  const std::string drift = "lio_mapper:\n  drift:\n    ";
+  for (const char* value : {"[0.1, 0.2]", "much", ".nan", "-0.1", "{x: 1}"}) {
+    EXPECT_THAT(error_with(drift + "yaw_sigma_rad_sqrtm: " + value + "\n"),
+                AllOf(HasSubstr("config.yaml:3: lio_mapper.drift.yaw_sigma_rad_sqrtm must be a "),
+                      HasSubstr("number, 0 or more; is ")))
+        << value;
+  }
+  EXPECT_THAT(error_with("lio_mapper: {drift: 0.3}\n"), HasSubstr("lio_mapper.drift must be"));
+  EXPECT_THAT(error_with("robot: {lidar_position_base_m: [1, 2]}\n"), HasSubstr("three numbers"));
+  EXPECT_EQ(error_with(drift + "yaw_sigma_rad_sqrtm: 0.5\nrobot: {}\n"), "");
+  EXPECT_EQ(past_settings_of(session()).drift.yaw_sigma_rad_sqrtm, 0.5);
+  EXPECT_EQ(error_with("lio_mapper: {drift: }\n"), "");
+}
+
+TEST_F(ExportSession, that_needs_a_place_on_the_earth_is_refused_before_the_map_is_rendered) {
+  write_keyframe();
+  double furthest = 0.0;
+  EXPECT_THAT(error_of([&] {
+                export_session(session(), out(), {{"las", "kmz"}}, [&](double share) {
+                  furthest = std::max(furthest, share);
+                });
+              }),
+              AllOf(HasSubstr("nothing to export"), HasSubstr("no datum.yaml"), HasSubstr("kmz")));
+  EXPECT_EQ(furthest, 0.0);
+  EXPECT_FALSE(std::filesystem::exists(out()));
+}
+
 TEST_F(ExportSession, of_a_drive_twice_is_no_merge_and_both_are_named) {
   write_keyframe(true);
   write_datum(path_in(session(), session_file::kDatum), Datum{43.9, -78.9, 100.0});
   EXPECT_THAT(error_of([&] { merge_sessions(session(), session(), out(), 0.1, {}); }),
               AllOf(HasSubstr(session() + " and " + session()), HasSubstr("not one twice")));
+}
+
+TEST_F(ExportSession, merged_with_another_one_and_broken_off_leaves_nothing_and_can_be_repeated) {
+  const std::string second = out("second");
+  for (const std::string& folder : {session(), second}) {
+    create_session_folder(folder);
+    lio_mapper::KeyframeWriter writer(path_in(folder, session_file::kKeyframes));
+    lio_mapper::Keyframe keyframe;
+    keyframe.stamp_ns = folder == second ? 2 : 1;
+    keyframe.aligned = true;
+    keyframe.points_base = {{1.0F, 0.0F, 0.0F, 7.0F}};
+    writer.append(keyframe);
+    write_datum(path_in(folder, session_file::kDatum), Datum{43.9, -78.9, 100.0});
+  }
+  const std::string merged = out("merged");
+  const auto break_off = [](double share) {
+    if (share > 0.6) {  // while the map is rendered
+      throw std::runtime_error("stop");
+    }
+  };
+  EXPECT_EQ(error_of([&] { merge_sessions(session(), second, merged, 0.1, break_off); }), "stop");
+  EXPECT_TRUE(std::filesystem::is_empty(merged));
+  EXPECT_EQ(merge_sessions(session(), second, merged, 0.1, {}).graph.keyframes, 2U);
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(merged)) {
+    names.push_back(entry.path().filename());
+  }
+  EXPECT_THAT(names,
+              testing::UnorderedElementsAre("datum.yaml", "map.pcd", "first.tum", "second.tum"));
 }
 
 }  // namespace

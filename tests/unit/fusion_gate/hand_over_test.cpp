@@ -4,9 +4,12 @@
 
 #include "trigpoint/base/so3.hpp"
 
+#include "simulated_drive.hpp"
 #include <gtest/gtest.h>
 
 #include <numbers>
+#include <utility>
+#include <vector>
 
 namespace trigpoint::fusion_gate {
 namespace {
@@ -69,6 +72,57 @@ TEST(HandOver, keeps_the_robots_place_when_the_estimate_turns_about_it) {
   const Odometry published = hand_over.follow(at(0.1, after), before);
   EXPECT_NEAR((published.T_frame_child.p - before.p).norm(), 0.0, kExact);
 }
+
+Scenario smooth_drive(bool with_imu_rate) {
+  Scenario scenario;
+  scenario.config = Config{};
+  scenario.config.mode = "smooth";
+  scenario.with_imu_rate = with_imu_rate;
+  return scenario;
+}
+
+/// Where the robot is published less where the truth is, from `from_s` on.
+std::vector<std::pair<double, Eigen::Vector3d>> errors(const SimulatedDrive& drive, double from_s) {
+  std::vector<std::pair<double, Eigen::Vector3d>> result;
+  for (const Odometry& fused : drive.record().fused) {
+    const double at_s = to_seconds(fused.stamp_ns - drive.stamp(0.0));
+    if (at_s >= from_s) {
+      result.emplace_back(at_s, fused.T_frame_child.p - drive.T_map_base(at_s).p);
+    }
+  }
+  return result;
+}
+
+class LioOf : public testing::TestWithParam<bool> {};
+
+TEST_P(LioOf, is_followed_without_delay_while_it_goes_as_the_robot_goes) {
+  SimulatedDrive drive{smooth_drive(GetParam())};
+  drive.run_until(30.0);
+  for (const auto& [at_s, error_m] : errors(drive, 10.0)) {
+    EXPECT_LT(error_m.norm(), 1e-3) << at_s;
+  }
+}
+
+/// The simulated mapper takes no rows, so that what is published ends where LIO is.
+TEST_P(LioOf, is_followed_at_the_rate_where_it_finds_the_robot_elsewhere) {
+  constexpr double kFound_m = 0.3;
+  constexpr double kAt_s = 20.0;
+  SimulatedDrive drive{smooth_drive(GetParam())};
+  drive.run_until(kAt_s);
+  drive.lio_found_elsewhere_m.x() = kFound_m;
+  drive.run_until(kAt_s + 3.0);
+  const auto after = errors(drive, kAt_s - 0.5);
+  for (std::size_t i = 1; i < after.size(); ++i) {
+    const double dt_s = after[i].first - after[i - 1].first;
+    EXPECT_LT((after[i].second - after[i - 1].second).norm(), kRate_mps * dt_s + 0.002)
+        << after[i].first;
+  }
+  EXPECT_NEAR(after.back().second.norm(), kFound_m, 0.01);
+}
+
+INSTANTIATE_TEST_SUITE_P(Gate, LioOf, testing::Values(true, false), [](const auto& each) {
+  return each.param ? "at_100_hz" : "at_10_hz";
+});
 
 }  // namespace
 }  // namespace trigpoint::fusion_gate

@@ -149,6 +149,7 @@ class SimulatedDrive {
     odometry.frame_id = "odom";
     odometry.child_frame_id = "base_link";
     odometry.T_frame_child = T_odom_base(now_s);
+    odometry.T_frame_child.p += lio_found_elsewhere_m;
     odometry.pose_covariance = PoseCovariance::Identity() * 1e-4;
     return odometry;
   }
@@ -189,6 +190,7 @@ class SimulatedDrive {
 
   Nanoseconds stamp(double now_s) const { return from_seconds(start_s_ + now_s); }
 
+  Eigen::Vector3d lio_found_elsewhere_m{Eigen::Vector3d::Zero()};  ///< from now on
   bool lio_alive{true};
   bool gps_alive{true};
   std::uint32_t epoch{7};

@@ -307,6 +307,32 @@ TEST(InsTracker, stands_still_while_it_rests_without_fixes) {
   EXPECT_LT(result.odometry.back().linear_mps.norm(), 0.02);
 }
 
+/// Straight on over a floor so smooth that the IMU is as quiet at 1.5 m/s as in the stops of 4 s,
+/// which the coarse fixes alone tell apart.
+TEST(InsTracker, does_not_take_a_steady_drive_over_a_smooth_floor_for_a_rest) {
+  const auto speed_mps = [](double time_s) {
+    const double in_lap_s = std::fmod(time_s, 24.0);
+    return 1.5 * std::clamp(std::min(in_lap_s - 2.0, 22.0 - in_lap_s), 0.0, 1.0);
+  };
+  const auto truth = drive({speed_mps, [](double) { return 0.0; }}, 100.0);
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    Sensors sensors;
+    sensors.accel_noise_mps2 = 0.05;
+    sensors.white_sigma_m = 0.3;
+    sensors.wander_sigma_m = 0.4;
+    sensors.wander_tau_s = 30.0;
+    sensors.reported_sigma_m = 0.6;
+    sensors.status = FixStatus::kFix;
+    GpsOdometry filter(config_with_datum(kIns), sensors.robot);
+    const Recorded result = run(filter, sense(truth, sensors, seed), truth);
+    double worst_m = 0.0;
+    for (const Sample& sample : result.samples) {
+      worst_m = std::max(worst_m, sample.error_m.head<2>().norm());
+    }
+    EXPECT_LT(worst_m, 6.0) << "seed " << seed;
+  }
+}
+
 /// Straight ahead, with the nose 0.3 rad to the left of the course from 20 s on: a boat in a
 /// current.
 TEST(InsTracker, does_not_believe_in_rolling_wheels_when_told_so) {

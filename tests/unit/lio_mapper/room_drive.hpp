@@ -16,13 +16,16 @@
 
 namespace trigpoint::lio_mapper::testing_support {
 
-/// Stands for `rest_s`, then goes around an ellipse in a hall of 40 x 24 x 6 m with four pillars.
+/// Stands for `rest_s`, then goes around an ellipse in a hall of 40 x 24 x 6 m with four pillars;
+/// other drives give other poses and other walls.
 class RoomDrive {
  public:
   explicit RoomDrive(double rest_s = 1.0, double speed_mps = 2.0)
       : rest_s_(rest_s), rate_radps_(speed_mps / kRadius_m) {}
 
-  Pose pose_at(double t_s) const {
+  virtual ~RoomDrive() = default;
+
+  virtual Pose pose_at(double t_s) const {
     const double angle = angle_at(t_s);
     const Eigen::Vector3d p{kRadius_m * std::sin(angle),
                             0.6 * kRadius_m * (1.0 - std::cos(angle)),
@@ -101,7 +104,7 @@ class RoomDrive {
   }
 
   /// Distance to the nearest of the hall's six faces and the pillars' sides.
-  static double cast(const Eigen::Vector3d& from, const Eigen::Vector3d& direction) {
+  virtual double cast(const Eigen::Vector3d& from, const Eigen::Vector3d& direction) const {
     double nearest = std::numeric_limits<double>::infinity();
     const Eigen::Vector3d low{-20.0, -6.0, -1.5};
     const Eigen::Vector3d high{20.0, 18.0, 4.5};

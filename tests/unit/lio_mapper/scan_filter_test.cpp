@@ -2,6 +2,8 @@
 // Copyright the Trigpoint developers
 #include "scan_filter.hpp"
 
+#include "drift.hpp"
+#include "propagation.hpp"
 #include "random_state.hpp"
 #include "room_drive.hpp"
 #include "start_up.hpp"
@@ -124,6 +126,28 @@ TEST(Drift, tilt_noise_turns_odom_about_the_robot_and_leaves_its_place_in_map) {
   const auto H = predict_row(state, path, kFilterEpoch_ns, Eigen::Vector3d::Zero()).jacobian;
   EXPECT_LT((H * covariance * H.transpose()).norm(), 1e-9);
   EXPECT_NEAR(covariance(error::kGravity, error::kGravity), 1e-4, 1e-12);
+}
+
+TEST(Drift, gravity_comes_in_along_the_axes_that_scans_leave_open_and_only_there) {
+  const Eigen::Matrix3d blind = blindness(Eigen::Vector3d(0.0, 1e4, 1e4).asDiagonal());
+  EXPECT_NEAR(blind(0, 0), 1.0, 1e-12);
+  EXPECT_LT(blind(1, 1), 2e-3);
+  DriftConfig drift;
+  drift.blind_tilt_rad_sqrts = 1e-3;
+  const State state;
+  ErrorMatrix covariance = ErrorMatrix::Zero();
+  add_blind_tilt_noise(drift, 4.0, blind, state, false, covariance);
+  InertialStep second;
+  second.begin.accel_mps2 = {0.0, 0.0, 9.80665};
+  second.end = second.begin;
+  second.end.stamp_ns = kNanosecondsPerSecond;
+  const StepJacobian jacobian = step_jacobian(state, second);
+  apply_transition(jacobian, covariance);
+  covariance.transposeInPlace();
+  apply_transition(jacobian, covariance);
+  // A tilt of 2 mrad for a second.
+  EXPECT_NEAR(std::sqrt(covariance(error::kVelocity, error::kVelocity)), 2e-3 * 9.80665, 1e-4);
+  EXPECT_LT(covariance(error::kVelocity + 1, error::kVelocity + 1), 1e-5 * 4.0);
 }
 
 }  // namespace

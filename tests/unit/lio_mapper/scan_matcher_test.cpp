@@ -290,5 +290,40 @@ TEST(ScanMatcher, planes_that_follow_the_scan_hold_nothing) {
   EXPECT_NEAR(crowns(2, 2), posts(2, 2), 0.02 * posts(2, 2));
 }
 
+/// A tunnel in which nearest points hold the length, each of them where it is: at every point that
+/// stands out from the axis by less than `within_m`.
+class TunnelWithPosts final : public UnchangingMap {
+ public:
+  explicit TunnelWithPosts(double within_m) : within_m_(within_m) {}
+
+  bool match_surface(const Eigen::Vector3d& p, PlaneMatch& plane) const override {
+    return tunnel_.match_surface(p, plane);
+  }
+
+  bool match_nearest(const Eigen::Vector3d& p, PlaneMatch& plane) const override {
+    plane = {Eigen::Vector3d::UnitX(), p.x() < 0.0 ? 4.0 : -4.0, 0.1 * 0.1, 0.0};
+    return p.tail<2>().cwiseAbs().maxCoeff() < within_m_;
+  }
+
+ private:
+  double within_m_;
+  Room tunnel_{false};
+};
+
+double information_along(double within_m) {
+  const TunnelWithPosts tunnel(within_m);
+  const PointCloud points = room_points();
+  const MatchingConfig config;
+  Workers workers{2};
+  ScanMatcher matcher(points, tunnel, Pose{}, config, workers);
+  return matcher.linearise(Pose{}).information(0, 0);
+}
+
+/// Two posts at the tunnel's ends have nobody to bear them out, walls have each other.
+TEST(ScanMatcher, what_two_places_say_of_an_open_axis_is_not_believed) {
+  EXPECT_GT(information_along(4.0), 50.0);
+  EXPECT_NEAR(information_along(0.5), 0.0, 1e-6);
+}
+
 }  // namespace
 }  // namespace trigpoint::lio_mapper

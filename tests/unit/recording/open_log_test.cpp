@@ -67,6 +67,33 @@ TEST_F(OpenLog, names_an_unknown_topic_the_nearest_one_and_all_there_are) {
                     HasSubstr("/points_raw (sensor_msgs/msg/PointCloud2, 100)")));
 }
 
+TEST_F(OpenLog, refuses_messages_that_were_all_received_at_the_same_moment) {
+  const auto path = (folder_ / "log").string();
+  {
+    Rosbag2Writer writer(path);
+    for (int i = 0; i < 3; ++i) {
+      writer.write("imu_raw", 0, sample_imu(i));
+      writer.write("gps/fix", 0, sample_fix(i));
+      writer.write("points_raw", 0, sample_cloud(i));
+    }
+  }
+  EXPECT_THAT(refusal(path, robot()),
+              AllOf(HasSubstr(path + ": all 9 messages are stored as received at 0.0"),
+                    HasSubstr("Write it anew")));
+}
+
+TEST_F(OpenLog, tells_that_some_messages_have_no_time_of_receiving) {
+  const auto path = (folder_ / "log").string();
+  {
+    Rosbag2Writer writer(path);
+    writer.write("gps/fix", 0, sample_fix(0));
+    writer.write("imu_raw", kStart_ns, sample_imu(0));
+    writer.write("points_raw", kStart_ns, sample_cloud(0));
+  }
+  EXPECT_THAT(open_log(path, robot())->summary().faults,
+              testing::ElementsAre(HasSubstr("received at 0 s, others later")));
+}
+
 TEST_F(OpenLog, says_that_a_log_has_no_imu_at_all) {
   const auto path = (folder_ / "log").string();
   {

@@ -55,20 +55,31 @@
   }
   const centre = add(scale(low, 0.5), scale(high, 0.5));
   const extent_m = Math.max(Math.hypot(high[0] - low[0], high[1] - low[1]), 30);
-  // Along the shorter side, so that the longer one lies across the picture.
-  const whole = {
-    target: centre, yaw: high[0] - low[0] >= high[1] - low[1] ? -1.9 : -0.35, pitch: 0.72,
-    distance: extent_m * Math.max(1, (1.2 * canvas.clientHeight) / Math.max(canvas.clientWidth, 1)),
-  };
-  let camera = {...whole};
-
-  const axes = () => {
-    const {yaw, pitch} = camera;
+  const axes_of = ({yaw, pitch}) => {
     const back = [Math.cos(pitch) * Math.cos(yaw), Math.cos(pitch) * Math.sin(yaw), Math.sin(pitch)];
     const right = [-Math.sin(yaw), Math.cos(yaw), 0];
     const up = [-Math.sin(pitch) * Math.cos(yaw), -Math.sin(pitch) * Math.sin(yaw), Math.cos(pitch)];
     return {back, right, up};
   };
+  // So far away that the box's corners lie within the picture, with room for what is seen beside the trajectories.
+  const distance_of = (direction) => {
+    const {back, right, up} = axes_of(direction);
+    const tangent = 0.88 * Math.tan(FIELD_OF_VIEW / 2);
+    const aspect = Math.max(canvas.clientWidth, 1) / Math.max(canvas.clientHeight, 1);
+    let distance_m = 30;
+    for (let corner = 0; corner < 8; ++corner) {
+      const p = add([0, 1, 2].map((i) => ((corner >> i) & 1 ? high[i] : low[i])), scale(centre, -1));
+      const beside_m = Math.max(Math.abs(dot(p, up)), Math.abs(dot(p, right)) / aspect);
+      distance_m = Math.max(distance_m, dot(p, back) + beside_m / tangent);
+    }
+    return distance_m;
+  };
+  const seen_from = (direction) => ({target: centre, ...direction, distance: distance_of(direction)});
+  // Along the shorter side, so that the longer one lies across the picture.
+  const whole = seen_from({yaw: high[0] - low[0] >= high[1] - low[1] ? -1.9 : -0.35, pitch: 0.72});
+  let camera = {...whole};
+
+  const axes = () => axes_of(camera);
   const matrix = () => {
     const {back, right, up} = axes();
     const eye = add(camera.target, scale(back, camera.distance));
@@ -394,7 +405,7 @@
   // ---- controls ----
   for (const name of ['colour', 'size', 'cut']) control(name).addEventListener('input', redraw);
   control('top').addEventListener('click', () => {
-    camera = {...whole, yaw: -Math.PI / 2, pitch: Math.PI / 2};
+    camera = seen_from({yaw: -Math.PI / 2, pitch: Math.PI / 2});
     redraw();
   });
   control('reset').addEventListener('click', () => { camera = {...whole}; redraw(); });

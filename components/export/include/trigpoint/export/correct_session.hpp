@@ -27,6 +27,7 @@ struct PastSettings {
   Eigen::Vector3d lidar_position_base_m{Eigen::Vector3d::Zero()};
 };
 
+/// Throws std::runtime_error naming file, line, key and rule when a value is not what it must be.
 PastSettings past_settings_of(const std::string& session);
 
 /// Keyframes, rows, lio.tum and the alignment of a session.
@@ -46,8 +47,9 @@ struct MergeReport {
 };
 
 /// Two independent sessions in one graph, each with its own GPS rows, in the map of the first (its
-/// datum). Writes map.pcd, datum.yaml, first.tum and second.tum (every sweep) into `out`. Throws
-/// std::runtime_error naming the file and the cause, e.g. a session without a datum.
+/// datum). Writes map.pcd, datum.yaml, first.tum and second.tum (every sweep) into `out`, all of
+/// them or, when it throws or `progress` does, none. Throws std::runtime_error naming the file and
+/// the cause, e.g. a session without a datum.
 MergeReport merge_sessions(const std::string& first,
                            const std::string& second,
                            const std::string& out,

@@ -105,6 +105,9 @@ struct DriftConfig {
   double map_renewal_per_m{0.02};
   /// Share of the variance of the map's points across their planes that the pose gathers per metre.
   double roughness_per_m{0.008};
+  /// Random walk of the tilt of odom against gravity that moves the robot along an axis which scans
+  /// do not hold.
+  double blind_tilt_rad_sqrts{1.6e-3};
 };
 
 struct RowsConfig {

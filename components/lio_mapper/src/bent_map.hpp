@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#pragma once
+
+#include "iterated_update.hpp"
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+
+namespace trigpoint::lio_mapper {
+
+/// By so much a map bends while LIO makes it.
+inline constexpr double kBend_rad = 0.01;
+
+/// Takes out of `measured` what is none. Planes hold the position across them; a map that bends
+/// turns them all by as much, and then they seem to hold it along them too: in a tunnel, its length
+/// through its floor. Little as that is of what they hold across, it is the same scan for scan, so
+/// that the length would soon pass for known. Along each principal axis of the prior's position, of
+/// the information A, N = kBend^2 times that across is such. The rest, f = 1 - N / A, is taken as
+/// with noisy normals: the information f^2 A with the gradient f g.
+/// `covariance`: of the prior, m^2 in odom's axes.
+template <int Size>
+void doubt_bent_map(const ErrorMatrix& covariance, Information<Size>& measured) {
+  const Eigen::Matrix3d A = measured.information.template topLeftCorner<3, 3>();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(
+      covariance.block<3, 3>(error::kPosition, error::kPosition));
+  Eigen::Matrix3d keep = Eigen::Matrix3d::Zero();
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d axis = axes.eigenvectors().col(i);
+    const double along = axis.dot(A * axis);
+    const double none = kBend_rad * kBend_rad * (A.trace() - along);
+    keep += std::max(0.0, 1.0 - none / (along + 1e-12)) * axis * axis.transpose();
+  }
+  measured.information.template topRows<3>() =
+      (keep * measured.information.template topRows<3>()).eval();
+  measured.information.template leftCols<3>() =
+      (measured.information.template leftCols<3>() * keep).eval();
+  measured.gradient.template head<3>() = (keep * measured.gradient.template head<3>()).eval();
+}
+
+}  // namespace trigpoint::lio_mapper

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// Where scans do not hold the position along an axis, nothing may make it look held.
+#include "bent_map.hpp"
+#include "room_drive.hpp"
+#include "scan_filter.hpp"
+#include "start_up.hpp"
+#include "sweep.hpp"
+#include <Eigen/LU>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <string>
+#include <variant>
+
+namespace trigpoint::lio_mapper {
+
+namespace {
+
+using testing_support::RoomDrive;
+
+constexpr Nanoseconds kSweep_ns = 100'000'000;
+constexpr Nanoseconds kImuPeriod_ns = 5'000'000;
+
+/// Rests, then drives straight through a corridor 2 m wide and 3 m high without ends or doors.
+class CorridorDrive final : public RoomDrive {
+ public:
+  Pose pose_at(double t_s) const override {
+    const double moving_s = std::max(0.0, t_s - kRest_s);
+    const double x_m = moving_s < kRampUp_s ? kSpeed_mps * moving_s * moving_s / (2.0 * kRampUp_s)
+                                            : kSpeed_mps * (moving_s - kRampUp_s / 2.0);
+    return {Eigen::Quaterniond::Identity(), {x_m, 0.0, 0.0}};
+  }
+
+ private:
+  static constexpr double kRest_s = 2.5;
+  static constexpr double kRampUp_s = 1.0;
+  static constexpr double kSpeed_mps = 1.5;
+
+  double cast(const Eigen::Vector3d& from, const Eigen::Vector3d& direction) const override {
+    double nearest_m = std::numeric_limits<double>::infinity();
+    const Eigen::Vector3d low_m{0.0, -1.0, -0.8};
+    const Eigen::Vector3d high_m{0.0, 1.0, 2.2};
+    for (const int axis : {1, 2}) {
+      if (std::abs(direction[axis]) > 1e-12) {
+        const double face_m = direction[axis] > 0.0 ? high_m[axis] : low_m[axis];
+        nearest_m = std::min(nearest_m, (face_m - from[axis]) / direction[axis]);
+      }
+    }
+    return nearest_m;
+  }
+};
+
+struct Along {
+  double error_m;
+  double sigma_m;
+};
+
+/// Of the position along the corridor after `seconds`, without GPS.
+Along driven(unsigned seed, int seconds) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0.0, 1.0);
+  CorridorDrive drive;
+  drive.noise_seed = 1000 * seed;
+  drive.range_sigma_m = 0.02;
+  for (int i = 0; i < 3; ++i) {
+    drive.gyro_bias_radps[i] = 1e-3 * normal(random);
+    drive.accel_bias_mps2[i] = 0.03 * normal(random);
+  }
+  Config config;
+  ImuBuffer imu;
+  Eigen::Vector3d accel_sum = Eigen::Vector3d::Zero();
+  constexpr int kAtRest = 400;
+  for (int i = 0; i <= seconds * 200 + 40; ++i) {
+    ImuSample sample = drive.imu_at(RoomDrive::kEpoch_ns + i * kImuPeriod_ns);
+    for (int axis = 0; axis < 3; ++axis) {
+      sample.gyro_radps[axis] += 4e-3 * normal(random);
+      sample.accel_mps2[axis] += 0.06 * normal(random);
+    }
+    accel_sum += i < kAtRest ? sample.accel_mps2 : Eigen::Vector3d::Zero();
+    imu.push({sample.stamp_ns, sample.gyro_radps, sample.accel_mps2});
+  }
+  InitialState initial = level(accel_sum / kAtRest, RoomDrive::kEpoch_ns, config.imu, {});
+  initial.state.gyro_bias_radps = drive.gyro_bias_radps;
+  ScanFilter filter(config, Pose{}, initial);
+  SweepDecoder decoder{SweepTimingConfig{}};
+  for (int i = 0; i < seconds * 10; ++i) {
+    Events events;
+    const auto decoded =
+        decoder.decode(drive.sweep_at(RoomDrive::kEpoch_ns + i * kSweep_ns), events);
+    filter.insert(filter.process(std::get<Sweep>(decoded), imu));
+  }
+  const double truth_m = drive.pose_at(seconds).p.x();
+  return {filter.state().T_odom_base.p.x() - truth_m, std::sqrt(filter.covariance()(0, 0))};
+}
+
+/// A floor, walls and ceiling that hold across 1 cm each, turned by `bend_rad` about y.
+PoseInformation tunnel(double bend_rad, double along) {
+  PoseInformation sum;
+  const Eigen::Vector3d up(std::sin(bend_rad), 0.0, std::cos(bend_rad));
+  const Eigen::Vector3d length(std::cos(bend_rad), 0.0, -std::sin(bend_rad));
+  Eigen::Matrix3d A = 1e4 * up * up.transpose() + along * length * length.transpose();
+  A(1, 1) += 1e4;
+  sum.information.topLeftCorner<3, 3>() = A;
+  sum.information.bottomRightCorner<3, 3>() = 1e6 * Eigen::Matrix3d::Identity();
+  sum.gradient.head<3>() = 0.01 * A * (up + length);
+  sum.count = 1000;
+  return sum;
+}
+
+/// Variances of the position after 100 scans of a map that bends to and fro.
+Eigen::Vector3d after_scans(bool doubted, double along) {
+  ErrorMatrix P = 1e-4 * ErrorMatrix::Identity();
+  P(0, 0) = 1.0;
+  for (int scan = 0; scan < 100; ++scan) {
+    PoseInformation sum = tunnel(scan % 2 == 0 ? 0.005 : -0.005, along);
+    if (doubted) {
+      doubt_bent_map(P, sum);
+    }
+    Matrix6d root = P.topLeftCorner<6, 6>().inverse() + sum.information;
+    P.topLeftCorner<6, 6>() = root.inverse();
+  }
+  return P.diagonal().head<3>();
+}
+
+TEST(BentMap, does_not_hold_the_position_along_its_planes) {
+  EXPECT_LT(after_scans(false, 0.0).x(), 0.1) << "or there was nothing to doubt";
+  EXPECT_GT(after_scans(true, 0.0).x(), 0.99);
+  EXPECT_NEAR(after_scans(true, 0.0).y(), after_scans(false, 0.0).y(), 1e-9);
+}
+
+TEST(BentMap, takes_nothing_from_what_holds) {
+  EXPECT_NEAR(after_scans(true, 1e4).x() / after_scans(false, 1e4).x(), 1.0, 1e-3);
+  PoseInformation sum = tunnel(0.0, 1e4);
+  const Vector6d before = sum.information.ldlt().solve(sum.gradient);
+  doubt_bent_map(ErrorMatrix::Identity(), sum);
+  EXPECT_LT((sum.information.ldlt().solve(sum.gradient) - before).norm(), 1e-5);
+}
+
+TEST(Corridor, its_length_is_as_uncertain_as_it_is_wrong) {
+  double squares = 0.0;
+  constexpr int kSeeds = 8;
+  for (unsigned seed = 1; seed <= kSeeds; ++seed) {
+    const Along along = driven(seed, 20);
+    RecordProperty("seed_" + std::to_string(seed),
+                   std::to_string(along.error_m) + " +- " + std::to_string(along.sigma_m));
+    EXPECT_LT(std::abs(along.error_m), 6.0) << "far more than gravity through 10 mrad";
+    squares += along.error_m * along.error_m / (along.sigma_m * along.sigma_m);
+  }
+  // Chi-square of 8 degrees of freedom: 0.999 quantile.
+  EXPECT_LT(squares, 26.1);
+}
+
+}  // namespace
+
+}  // namespace trigpoint::lio_mapper
