@@ -46,7 +46,7 @@ Figure told(std::string name, double value, Bound bound = {}) {
   return figure;
 }
 
-Bound at_most(double value) {
+Bound map_at_most(double value) {
   return {std::nullopt, value};
 }
 
@@ -128,9 +128,10 @@ PointCloud saved_map(const std::string& session, const exporter::CorrectedPoses&
 
 Figures same_surfaces(const std::string& of, const PointCloud& first, const PointCloud& second) {
   const auto offset = evaluation::facade_offset(first, second);
-  return {told("walls " + of + ", their distance: median, m", offset.median_m),
-          told("walls " + of + ", their distance: 90 %, m", offset.p90_m, at_most(kSameSurface_m)),
-          told("walls " + of + ": number", static_cast<double>(offset.planes))};
+  return {
+      told("walls " + of + ", their distance: median, m", offset.median_m),
+      told("walls " + of + ", their distance: 90 %, m", offset.p90_m, map_at_most(kSameSurface_m)),
+      told("walls " + of + ": number", static_cast<double>(offset.planes))};
 }
 
 void append(Figures& to, const Figures& more) {

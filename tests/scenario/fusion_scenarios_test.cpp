@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::uint64_t kSeeds = 5;
 constexpr double kFixPeriod_s = 0.2;
-constexpr double kRounding = 1e-9;
+constexpr double kScenarioRounding = 1e-9;
 
 Drive drive_of(const std::string& scenario, std::uint64_t seed) {
   cli::InputOptions input;
@@ -64,7 +64,7 @@ TEST(FusionScenarios, have_gps_at_5_hz) {
     for (std::size_t i = 1; i < drive.fixes.size(); ++i) {
       ASSERT_NEAR(to_seconds(drive.fixes[i].stamp_ns - drive.fixes[i - 1].stamp_ns),
                   kFixPeriod_s,
-                  kRounding)
+                  kScenarioRounding)
           << scenario;
     }
   }
@@ -125,7 +125,7 @@ TEST(FusionScenarios, wander_5_m_off_from_right_fixes_without_a_jump) {
     double last_m = 0.0;
     for (const simulator::FixTruth& fix : drive.fixes) {
       const double now_m = fix.fault_error_enu_m.norm();
-      ASSERT_LT(now_m - last_m, 1.5 * 5.0 / 20.0 * kFixPeriod_s + kRounding);
+      ASSERT_LT(now_m - last_m, 1.5 * 5.0 / 20.0 * kFixPeriod_s + kScenarioRounding);
       ASSERT_FALSE(fix.lost && now_m > 0.0);
       largest_m = std::max(largest_m, now_m);
       last_m = now_m;
@@ -140,7 +140,7 @@ TEST(FusionScenarios, lift_the_height_after_60_s_only) {
     for (const simulator::FixTruth& fix : drive.fixes) {
       const double late_s = since_start_s(drive, fix.stamp_ns) - 60.0;
       const double lift_m = std::string(change) == "height_step" ? 30.0 : 0.1 * late_s;
-      ASSERT_NEAR(fix.fault_error_enu_m.z(), late_s < 0.0 ? 0.0 : lift_m, kRounding);
+      ASSERT_NEAR(fix.fault_error_enu_m.z(), late_s < 0.0 ? 0.0 : lift_m, kScenarioRounding);
       ASSERT_EQ(fix.fault_error_enu_m.head<2>().norm(), 0.0);
     }
   }

@@ -131,7 +131,7 @@ int examine_entries(recording::LogReader& reader, const RobotConfig& robot) {
          tell(robot.fix_topic, fixes.remarks());
 }
 
-std::string without_slash(const std::string& topic) {
+std::string plain_topic(const std::string& topic) {
   return topic.starts_with('/') ? topic.substr(1) : topic;
 }
 
@@ -148,8 +148,7 @@ int tell_topics(const recording::LogSummary& summary, const RobotConfig& robot) 
   const auto messages_of = [&](const std::string& name, const std::string& type) {
     std::uint64_t count = 0;
     for (const recording::TopicSummary& topic : summary.topics) {
-      const bool named =
-          summary.format == "kitti" || without_slash(topic.topic) == without_slash(name);
+      const bool named = summary.format == "kitti" || plain_topic(topic.topic) == plain_topic(name);
       count += named && topic.type == type ? topic.messages : 0;
     }
     return count;

@@ -30,7 +30,7 @@ struct SimulateOptions {
 };
 
 /// Thrown out of the simulation between two messages: the log is closed on the way.
-struct Interrupted {};
+struct DriveInterrupted {};
 
 void simulate(const SimulateOptions& options,
               const simulator::Scenario& scenario,
@@ -39,7 +39,7 @@ void simulate(const SimulateOptions& options,
   Progress progress("simulating");
   const auto tell_or_stop = [&](double share) {
     if (stop.requested()) {
-      throw Interrupted();
+      throw DriveInterrupted();
     }
     progress(share);
   };
@@ -81,7 +81,7 @@ int run(const SimulateOptions& options) {
   refuse_used_folder((std::filesystem::path(options.out) / "log").string());
   try {
     simulate(options, scenario, duration_s);
-  } catch (const Interrupted&) {
+  } catch (const DriveInterrupted&) {
     std::cerr << "trigpoint simulate: interrupted; " << options.out
               << "/log is whole up to there and can be used\n";
     return kInterrupted;

@@ -263,7 +263,7 @@ std::string summary_of(const ComparisonBlock& block) {
   return table.str() + "\n";
 }
 
-std::string span_of(const Trajectory& trajectory) {
+std::string compared_span_of(const Trajectory& trajectory) {
   return exporter::stamp_text(trajectory.front().stamp_ns) + " to " +
          exporter::stamp_text(trajectory.back().stamp_ns) + " s";
 }
@@ -278,9 +278,10 @@ Comparison compare(const ComparisonInput& input) {
     for (const Estimate& estimate : sides.estimates) {
       Compared compared = compare(estimate, reference, sides.outages, input.largest_gap_ns);
       if (compared.pairs.empty()) {
-        comparison.remarks.push_back(estimate.name + " (" + span_of(estimate.trajectory) +
+        comparison.remarks.push_back(estimate.name + " (" + compared_span_of(estimate.trajectory) +
                                      ") and " + reference.name + " (" +
-                                     span_of(reference.trajectory) + ") have no moment in common.");
+                                     compared_span_of(reference.trajectory) +
+                                     ") have no moment in common.");
         continue;
       }
       block.compared.push_back(std::move(compared));

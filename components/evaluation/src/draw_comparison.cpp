@@ -13,7 +13,7 @@ namespace trigpoint::evaluation {
 
 namespace {
 
-constexpr int kWidth_px = 1300;
+constexpr int kComparisonWidth_px = 1300;
 constexpr std::array<const char*, 5> kColours{"#17853c",
                                               "#8e3fae",
                                               "#e8772e",
@@ -59,13 +59,13 @@ std::string left_out_of(const Comparison& comparison) {
 }
 
 /// The pairs of one estimate, aligned.
-struct Curve {
+struct ComparedCurve {
   std::string title;
   std::string style;
   std::vector<PosePair> pairs;
 };
 
-std::vector<PosePair> thinned(const std::vector<PosePair>& pairs) {
+std::vector<PosePair> thinned_pairs(const std::vector<PosePair>& pairs) {
   constexpr std::size_t kMost = 10'000;
   const std::size_t step = pairs.size() / kMost + 1;
   std::vector<PosePair> few;
@@ -76,8 +76,8 @@ std::vector<PosePair> thinned(const std::vector<PosePair>& pairs) {
 }
 
 /// The first one is drawn last, over the others: it is the one that is published.
-std::vector<Curve> curves_of(const ComparisonBlock& block, AlignmentKind kind) {
-  std::vector<Curve> curves;
+std::vector<ComparedCurve> curves_of(const ComparisonBlock& block, AlignmentKind kind) {
+  std::vector<ComparedCurve> curves;
   std::size_t estimate = 0;
   for (const Compared& compared : block.compared) {
     // The same colour in every picture, also where another one is left out.
@@ -88,16 +88,16 @@ std::vector<Curve> curves_of(const ComparisonBlock& block, AlignmentKind kind) {
     if (const auto T = align(compared.pairs, kind)) {
       curves.push_back({title_of(compared.evaluation.estimate_name),
                         std::string(" lw 1.8 lc rgb '") + colour + "'",
-                        place_estimates(*T, thinned(compared.pairs))});
+                        place_estimates(*T, thinned_pairs(compared.pairs))});
     }
   }
   std::reverse(curves.begin(), curves.end());
   return curves;
 }
 
-Nanoseconds begin_of(const std::vector<Curve>& curves) {
+Nanoseconds begin_of(const std::vector<ComparedCurve>& curves) {
   Nanoseconds begin_ns = curves.front().pairs.front().stamp_ns;
-  for (const Curve& curve : curves) {
+  for (const ComparedCurve& curve : curves) {
     begin_ns = std::min(begin_ns, curve.pairs.front().stamp_ns);
   }
   return begin_ns;
@@ -117,7 +117,7 @@ std::string draw_errors(const ComparisonBlock& block,
   const Picture picture(exporter::path_in(folder, "plots"), name);
   const Nanoseconds begin_ns = begin_of(curves);
   std::vector<std::string> files;
-  for (const Curve& curve : curves) {
+  for (const ComparedCurve& curve : curves) {
     DataFile rows;
     for (const PosePair& pair : curve.pairs) {
       const Eigen::Vector3d e = pair.estimate.p - pair.reference.p;
@@ -145,7 +145,7 @@ std::string draw_errors(const ComparisonBlock& block,
     body << "\n";
   }
   body << "unset multiplot\n";
-  return picture.draw(gnuplot, kWidth_px, 1100, body.str());
+  return picture.draw(gnuplot, kComparisonWidth_px, 1100, body.str());
 }
 
 std::string draw_top_view(const ComparisonBlock& block,
@@ -187,7 +187,7 @@ std::string draw_top_view(const ComparisonBlock& block,
          << " using 1:2 with lines" << curves[i].style << " title " << quoted(curves[i].title);
   }
   body << "\n";
-  return picture.draw(gnuplot, kWidth_px, 900, body.str());
+  return picture.draw(gnuplot, kComparisonWidth_px, 900, body.str());
 }
 
 }  // namespace

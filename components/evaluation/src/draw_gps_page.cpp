@@ -14,14 +14,14 @@ namespace trigpoint::evaluation {
 
 namespace {
 
-constexpr int kWidth_px = 1500;
-constexpr int kPanelHeight_px = 300;
+constexpr int kGpsPageWidth_px = 1500;
+constexpr int kGpsPanelHeight_px = 300;
 constexpr int kAllHeight_px = 560;
 constexpr double kSigmas = 3.0;
 constexpr double kLeast_m = 1e-3;   // of the logarithmic scale
 constexpr double kLinear_m = 0.03;  // about where the bands' scale turns from linear to logarithmic
 constexpr std::array<const char*, 3> kAxes{"east", "north", "up"};
-constexpr std::array<const char*, 4> kColours{"#1f6fbf", "#2a9d4a", "#c0392b", "#7d3c98"};
+constexpr std::array<const char*, 4> kGpsPageColours{"#1f6fbf", "#2a9d4a", "#c0392b", "#7d3c98"};
 
 DataFile rows_of(const FilterErrors& filter) {
   DataFile rows;
@@ -122,7 +122,7 @@ void draw_bands(const GpsPage& page, const std::string& folder, const std::strin
     }
   }
   body << "unset multiplot\n";
-  picture.draw(gnuplot, kWidth_px, 3 * kPanelHeight_px, body.str());
+  picture.draw(gnuplot, kGpsPageWidth_px, 3 * kGpsPanelHeight_px, body.str());
 }
 
 void draw_all(const GpsPage& page, const std::string& folder, const std::string& gnuplot) {
@@ -136,14 +136,14 @@ void draw_all(const GpsPage& page, const std::string& folder, const std::string&
   for (std::size_t i = 0; i < page.filters.size(); ++i) {
     const FilterErrors& filter = page.filters[i];
     const std::string data = picture.data("all_" + filter.name + ".dat", rows_of(filter));
-    const char* colour = kColours.at(i % kColours.size());
+    const char* colour = kGpsPageColours.at(i % kGpsPageColours.size());
     body << (i == 0 ? "" : ", \\\n     ") << data << " using 1:8 with lines lw 1.5 lc rgb '"
          << colour << "' title " << quoted(filter.name + " error") << " noenhanced, \\\n     "
          << data << " using 1:9 with lines lw 2 dt 2 lc rgb '" << colour << "' title "
          << quoted(filter.name + " 3 sigma") << " noenhanced";
   }
   body << "\n";
-  picture.draw(gnuplot, kWidth_px, kAllHeight_px, body.str());
+  picture.draw(gnuplot, kGpsPageWidth_px, kAllHeight_px, body.str());
 }
 
 std::string html_of(const GpsPage& page) {

@@ -19,8 +19,8 @@ namespace {
 
 namespace file = exporter::session_file;
 
-constexpr int kWidth_px = 1500;
-constexpr double kMargin_m = 6.0;
+constexpr int kReproductionWidth_px = 1500;
+constexpr double kReproductionMargin_m = 6.0;
 constexpr double kLeastPart_m = 15.0;   ///< half a side of the part with the dropout
 constexpr double kLeastDetail_m = 0.3;  ///< and of that where modes differ
 constexpr std::size_t kMostPoints = 6'000;
@@ -44,19 +44,19 @@ std::string style_of(const std::string& mode) {
   return found == kStyles.end() ? "lw 2 lc rgb '#444444'" : found->line;
 }
 
-std::string title_of(const std::string& mode) {
+std::string picture_title_of(const std::string& mode) {
   const std::string name = paper_name_of(mode);
   return name.empty() ? mode : mode + " (" + name + ")";
 }
 
-struct Curve {
+struct ModeCurve {
   std::string mode;
   Trajectory fused;
 };
 
 /// What both pictures show, read once.
 struct Content {
-  std::vector<Curve> curves;
+  std::vector<ModeCurve> curves;
   Trajectory truth;
   Trajectory fixes;                ///< base_link at each: the lever arm taken off
   std::vector<FusionStatus> gate;  ///< of the last mode
@@ -95,7 +95,7 @@ Content read(const ReproducedDrive& drive) {
   }
   const bool is_empty = std::all_of(content.curves.begin(),
                                     content.curves.end(),
-                                    [](const Curve& curve) { return curve.fused.empty(); });
+                                    [](const ModeCurve& curve) { return curve.fused.empty(); });
   if (is_empty) {
     throw std::runtime_error("there is no trajectory in map to draw");
   }
@@ -119,8 +119,8 @@ struct Square {
   double half_m{kLeastPart_m};
 };
 
-const Curve& reference_curve(const Content& content) {
-  return *std::find_if(content.curves.rbegin(), content.curves.rend(), [](const Curve& curve) {
+const ModeCurve& reference_curve(const Content& content) {
+  return *std::find_if(content.curves.rbegin(), content.curves.rend(), [](const ModeCurve& curve) {
     return !curve.fused.empty();
   });
 }
@@ -137,7 +137,8 @@ Square around(const Trajectory& trajectory, const Keep& keep) {
   Square square;
   if (lowest_m.x() <= highest_m.x()) {
     square.centre_m = 0.5 * (lowest_m + highest_m);
-    square.half_m = std::max(kLeastPart_m, 0.5 * (highest_m - lowest_m).maxCoeff() + kMargin_m);
+    square.half_m =
+        std::max(kLeastPart_m, 0.5 * (highest_m - lowest_m).maxCoeff() + kReproductionMargin_m);
   }
   return square;
 }
@@ -157,7 +158,7 @@ Square around_furthest(const Content& content) {
   const Trajectory& reference = reference_curve(content).fused;
   double furthest_m = 0.0;
   Square square;
-  for (const Curve& curve : content.curves) {
+  for (const ModeCurve& curve : content.curves) {
     for (const PosePair& pair : associate(curve.fused, reference).pairs) {
       const double apart_m = (pair.estimate.p - pair.reference.p).head<2>().norm();
       if (apart_m >= furthest_m) {
@@ -215,7 +216,7 @@ class ReproductionPicture {
            << range_of(panels[i].part) << plot("1:2", "plot", i == 0) << "unset key\n";
     }
     body << "unset multiplot\n";
-    return picture_.draw(gnuplot, kWidth_px, 700, body.str());
+    return picture_.draw(gnuplot, kReproductionWidth_px, 700, body.str());
   }
 
   /// Fig. 11: the path in space, and the uncertainty of each axis with its threshold.
@@ -280,11 +281,11 @@ class ReproductionPicture {
         rows_of(content_.fixes),
         "points pt 6 ps 0.5 lc rgb '#9a9a9a'",
         "GPS fixes, lever arm taken off");
-    for (const Curve& curve : content_.curves) {
+    for (const ModeCurve& curve : content_.curves) {
       add(curve.mode + ".xyz",
           rows_of(curve.fused),
           "lines " + style_of(curve.mode),
-          title_of(curve.mode));
+          picture_title_of(curve.mode));
     }
     add("truth.xyz", rows_of(content_.truth), "lines lw 1 dt 2 lc rgb '#000000'", "truth");
     std::string text = verb + " ";

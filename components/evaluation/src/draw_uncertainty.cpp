@@ -17,7 +17,7 @@ namespace {
 
 namespace file = exporter::session_file;
 
-constexpr int kWidth_px = 1300;
+constexpr int kUncertaintyWidth_px = 1300;
 constexpr int kPanelHeight_px = 230;
 constexpr int kTimeLabel_px = 62;  ///< tics and label below the lowest panel
 constexpr std::array<const char*, 3> kAxisFiles{"east.dat", "north.dat", "up.dat"};
@@ -82,7 +82,7 @@ class UncertaintyPicture {
       body << "set format x '%g'\nset xlabel 'time [s]'\n" << error_panel();
     }
     body << "unset multiplot\n";
-    return picture_.draw(gnuplot, kWidth_px, height_px, body.str());
+    return picture_.draw(gnuplot, kUncertaintyWidth_px, height_px, body.str());
   }
 
  private:

@@ -42,11 +42,11 @@ void for_keys_about(const Vector3d& p, double reach_m, double side_m, const Visi
   }
 }
 
-using Points = std::vector<Vector3d>;
+using EntropyPoints = std::vector<Vector3d>;
 
 /// Every block with the points in it and within the radius of it.
-std::map<Key, Points> fill_blocks(const PointCloud& cloud, double radius_m, double share) {
-  std::map<Key, Points> blocks;
+std::map<Key, EntropyPoints> fill_blocks(const PointCloud& cloud, double radius_m, double share) {
+  std::map<Key, EntropyPoints> blocks;
   for (const PointXyzi& point : cloud) {
     const Vector3d p = point.position().cast<double>();
     if (!p.allFinite() || p.cwiseAbs().maxCoeff() > kFar_m) {
@@ -84,7 +84,9 @@ struct Neighbours {
   }
 };
 
-Neighbours neighbours_of(const Vector3d& p, const std::map<Key, Points>& cells, double radius_m) {
+Neighbours neighbours_of(const Vector3d& p,
+                         const std::map<Key, EntropyPoints>& cells,
+                         double radius_m) {
   Neighbours found;
   for_keys_about(p, radius_m, radius_m, [&](const Key& key) {
     const auto cell = cells.find(key);
@@ -113,7 +115,7 @@ MapEntropy mean_map_entropy(const PointCloud& cloud, double radius_m, std::size_
   }
   double sum = 0.0;
   for (const auto& [block, points] : fill_blocks(cloud, radius_m, result.share_looked_at)) {
-    std::map<Key, Points> cells;
+    std::map<Key, EntropyPoints> cells;
     for (const Vector3d& p : points) {
       cells[key_of(p, radius_m)].push_back(p);
     }

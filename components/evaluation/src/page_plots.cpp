@@ -20,7 +20,7 @@ namespace trigpoint::evaluation {
 
 namespace {
 
-using Points = std::vector<Eigen::Vector2d>;
+using PlotPoints = std::vector<Eigen::Vector2d>;
 
 constexpr std::size_t kMostKinds = 8;  ///< rows of verdicts; the rarest share the last
 constexpr double kNameInRow = 0.3;     ///< parts of a row from its upper edge
@@ -48,19 +48,19 @@ class TimePlots {
 
   /// Of `rows`, what `value` says of each.
   template <typename Rows, typename Value>
-  Points over_time(const Rows& rows, const Value& value) const {
-    Points points;
+  PlotPoints over_time(const Rows& rows, const Value& value) const {
+    PlotPoints points;
     for (const auto& row : rows) {
       points.emplace_back(time_s(row.stamp_ns), value(row));
     }
     return thinned_by_extremes(points);
   }
 
-  Points heights(const Trajectory& trajectory, const Pose& T = Pose{}) const {
+  PlotPoints heights(const Trajectory& trajectory, const Pose& T = Pose{}) const {
     return over_time(trajectory, [&](const auto& row) { return (T * row.pose.p).z(); });
   }
 
-  Points errors(const Trajectory& trajectory, const Pose& T = Pose{}) const {
+  PlotPoints errors(const Trajectory& trajectory, const Pose& T = Pose{}) const {
     return over_time(associate(trajectory, data_.truth).pairs, [&](const auto& pair) {
       return std::max((T * pair.estimate.p - pair.reference.p).norm(), kLowestError_m);
     });
@@ -144,9 +144,9 @@ std::string plot_sigma(const SessionData& data, const TimePlots& time, std::size
   return plot(time, "sigma-" + name, "Uncertainty " + name, y, curves, time.choices(axis));
 }
 
-std::vector<PlotCurve> estimates(const Points& gps,
-                                 const Points& fused,
-                                 const Points& lio,
+std::vector<PlotCurve> estimates(const PlotPoints& gps,
+                                 const PlotPoints& fused,
+                                 const PlotPoints& lio,
                                  bool is_lio_in_map) {
   return {{"gps", "gps filter", gps},
           {"fused", "fused", fused},
@@ -280,14 +280,14 @@ std::string plot_error(const SessionData& data) {
   const auto T_map_odom = lio_placement(data);
   const auto curves = estimates(time.errors(data.gps),
                                 time.errors(data.fused),
-                                T_map_odom ? time.errors(data.lio, *T_map_odom) : Points{},
+                                T_map_odom ? time.errors(data.lio, *T_map_odom) : PlotPoints{},
                                 T_map_odom.has_value());
   return plot(time, "error", "Distance from truth", axis_of(curves, true, "error [m]"), curves);
 }
 
 std::string plot_scan_times(const SessionData& data) {
   const TimePlots time(data);
-  Points times_ms;
+  PlotPoints times_ms;
   std::vector<double> intervals_ms;
   for (std::size_t i = 0; i < data.scans.size(); ++i) {
     const auto& status = data.scans[i].status;

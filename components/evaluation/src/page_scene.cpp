@@ -84,12 +84,12 @@ std::string data_element(const std::string& id, const std::string& base64) {
   return "<script type=\"text/plain\" id=\"" + id + "\">" + base64 + "</script>\n";
 }
 
-struct Box {
+struct SceneBox {
   Eigen::Vector3d low{Eigen::Vector3d::Zero()};
   Eigen::Vector3d step_m{Eigen::Vector3d::Ones()};
 };
 
-Box box_of(const PointCloud& cloud) {
+SceneBox box_of(const PointCloud& cloud) {
   Eigen::Vector3d low = Eigen::Vector3d::Constant(1e12);
   Eigen::Vector3d high = -low;
   for (const auto& point : cloud) {
@@ -97,10 +97,10 @@ Box box_of(const PointCloud& cloud) {
     low = low.cwiseMin(p);
     high = high.cwiseMax(p);
   }
-  return cloud.empty() ? Box{} : Box{low, ((high - low) / kSteps).cwiseMax(1e-6)};
+  return cloud.empty() ? SceneBox{} : SceneBox{low, ((high - low) / kSteps).cwiseMax(1e-6)};
 }
 
-std::string points_elements(const PointCloud& cloud, const Box& box) {
+std::string points_elements(const PointCloud& cloud, const SceneBox& box) {
   std::vector<std::uint16_t> places;
   std::vector<std::uint8_t> intensities;
   const Range range = range_of(cloud, [](const auto& point) { return point.intensity; });
@@ -186,7 +186,7 @@ std::string scene_of(const SessionData& data, const PointCloud& map, std::size_t
     return "";
   }
   const PointCloud cloud = sample_evenly(map, most_points);
-  const Box box = box_of(cloud);
+  const SceneBox box = box_of(cloud);
   const Range height = range_of(cloud, [](const auto& point) { return point.z; });
   json::Object scene;
   scene.add("count", json::number(std::uint64_t{cloud.size()}))

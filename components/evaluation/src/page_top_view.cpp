@@ -17,17 +17,17 @@ namespace trigpoint::evaluation {
 
 namespace {
 
-using Points = std::vector<Eigen::Vector2d>;
+using TopViewPoints = std::vector<Eigen::Vector2d>;
 
 constexpr double kMarginPart = 0.06;  ///< of the larger side
 constexpr double kLeastMargin_m = 20.0;
-constexpr int kMostCells = 1200;
+constexpr int kMostTopViewCells = 1200;
 constexpr double kMostOblong = 2.2;  ///< of the sides of the picture
-constexpr std::size_t kMostPoses = 6000;
+constexpr std::size_t kMostTopViewPoses = 6000;
 
-Points places(const Trajectory& trajectory, const Pose& T = Pose{}) {
-  Points points;
-  for (const auto& pose : thinned(trajectory, kMostPoses)) {
+TopViewPoints places(const Trajectory& trajectory, const Pose& T = Pose{}) {
+  TopViewPoints points;
+  for (const auto& pose : thinned(trajectory, kMostTopViewPoses)) {
     points.emplace_back((T * pose.pose.p).head<2>());
   }
   return points;
@@ -69,7 +69,7 @@ PlotCurve fixes_curve(const SessionData& data, bool used) {
           Drawn::kDots};
 }
 
-std::vector<PlotCurve> curves_of(const SessionData& data) {
+std::vector<PlotCurve> top_view_curves_of(const SessionData& data) {
   const auto T_map_odom = lio_placement(data);
   std::vector<PlotCurve> curves;
   if (data.datum) {
@@ -89,14 +89,14 @@ std::vector<PlotCurve> curves_of(const SessionData& data) {
   return curves;
 }
 
-struct Box {
+struct TopViewBox {
   Eigen::Vector2d low;
   Eigen::Vector2d high;
 };
 
 /// Around all curves, and no thin strip.
-std::optional<Box> box_of(const std::vector<PlotCurve>& curves) {
-  Box box{Eigen::Vector2d::Constant(1e12), Eigen::Vector2d::Constant(-1e12)};
+std::optional<TopViewBox> box_of(const std::vector<PlotCurve>& curves) {
+  TopViewBox box{Eigen::Vector2d::Constant(1e12), Eigen::Vector2d::Constant(-1e12)};
   for (const auto& curve : curves) {
     for (const auto& point : curve.points) {
       box.low = box.low.cwiseMin(point);
@@ -118,8 +118,8 @@ std::optional<Box> box_of(const std::vector<PlotCurve>& curves) {
   return box;
 }
 
-void add_map(SvgPlot& plot, const PointCloud& map, const Box& box) {
-  const auto raster = rasterise(map, box.low, box.high, kMostCells);
+void add_map(SvgPlot& plot, const PointCloud& map, const TopViewBox& box) {
+  const auto raster = rasterise(map, box.low, box.high, kMostTopViewCells);
   plot.add_picture("data:image/png;base64," + html::base64(png_of(raster)),
                    raster.lowest_m,
                    raster.lowest_m + raster.cell_m * Eigen::Vector2d(raster.columns, raster.rows));
@@ -150,7 +150,7 @@ void add_dropouts(SvgPlot& plot, const SessionData& data) {
 }  // namespace
 
 std::string plot_top_view(const SessionData& data, const PointCloud& map) {
-  const auto curves = curves_of(data);
+  const auto curves = top_view_curves_of(data);
   const auto box = box_of(curves);
   if (!box) {
     return "";

@@ -24,7 +24,7 @@ using Eigen::Vector3d;
 constexpr double kCell_m = 2.0;
 /// A cell also sees the points this far outside (in x and y), so that no border cuts a wall along
 /// its face.
-constexpr double kMargin_m = 0.5;
+constexpr double kPlaneMargin_m = 0.5;
 /// A point counts as upright when its column of this side reaches kColumnHeight_m in the cell:
 /// ground, roofs and bonnets do not.
 constexpr double kColumn_m = 0.2;
@@ -49,7 +49,7 @@ constexpr double kLowRank = 0.158655;
 constexpr double kHighRank = 0.841345;
 
 using CellKey = FacadeCell;
-using Points = std::vector<Vector3d>;
+using PlanePoints = std::vector<Vector3d>;
 
 std::int32_t index_of(double x_m, double side_m) {
   return static_cast<std::int32_t>(std::floor(x_m / side_m));
@@ -63,20 +63,20 @@ double at_rank(std::vector<double>& values, double rank) {
   return *at;
 }
 
-std::map<CellKey, Points> fill_cells(const PointCloud& cloud, double share) {
+std::map<CellKey, PlanePoints> fill_cells(const PointCloud& cloud, double share) {
   constexpr double kFar_m = 1e7;  // an index of that size still fits
-  std::map<CellKey, Points> cells;
+  std::map<CellKey, PlanePoints> cells;
   for (const PointXyzi& point : cloud) {
     const Vector3d p = point.position().cast<double>();
     if (!p.allFinite() || p.cwiseAbs().maxCoeff() > kFar_m) {
       continue;
     }
     const std::int32_t k = index_of(p.z(), kCell_m);
-    for (std::int32_t i = index_of(p.x() - kMargin_m, kCell_m);
-         i <= index_of(p.x() + kMargin_m, kCell_m);
+    for (std::int32_t i = index_of(p.x() - kPlaneMargin_m, kCell_m);
+         i <= index_of(p.x() + kPlaneMargin_m, kCell_m);
          ++i) {
-      for (std::int32_t j = index_of(p.y() - kMargin_m, kCell_m);
-           j <= index_of(p.y() + kMargin_m, kCell_m);
+      for (std::int32_t j = index_of(p.y() - kPlaneMargin_m, kCell_m);
+           j <= index_of(p.y() + kPlaneMargin_m, kCell_m);
            ++j) {
         const CellKey key{i, j, k};
         if (is_drawn(key, share)) {
@@ -89,8 +89,8 @@ std::map<CellKey, Points> fill_cells(const PointCloud& cloud, double share) {
 }
 
 /// Only points that stand above or below others.
-Points upright(const Points& points) {
-  struct Range {
+PlanePoints upright(const PlanePoints& points) {
+  struct HeightRange {
     double lowest_m{1e9};
     double highest_m{-1e9};
   };
@@ -98,15 +98,15 @@ Points upright(const Points& points) {
   const auto column_of = [](const Vector3d& p) {
     return std::array{index_of(p.x(), kColumn_m), index_of(p.y(), kColumn_m)};
   };
-  std::map<std::array<std::int32_t, 2>, Range> columns;
+  std::map<std::array<std::int32_t, 2>, HeightRange> columns;
   for (const Vector3d& p : points) {
-    Range& range = columns[column_of(p)];
+    HeightRange& range = columns[column_of(p)];
     range.lowest_m = std::min(range.lowest_m, p.z());
     range.highest_m = std::max(range.highest_m, p.z());
   }
-  Points kept;
+  PlanePoints kept;
   std::copy_if(points.begin(), points.end(), std::back_inserter(kept), [&](const Vector3d& p) {
-    const Range& range = columns[column_of(p)];
+    const HeightRange& range = columns[column_of(p)];
     return range.highest_m - range.lowest_m >= kColumnHeight_m;
   });
   return kept;
@@ -114,8 +114,8 @@ Points upright(const Points& points) {
 
 using Plane = Facade;
 
-Points near_to(const Plane& plane, const Points& points, double distance_m) {
-  Points near;
+PlanePoints near_to(const Plane& plane, const PlanePoints& points, double distance_m) {
+  PlanePoints near;
   std::copy_if(points.begin(), points.end(), std::back_inserter(near), [&](const Vector3d& p) {
     return std::abs(plane.distance_m(p)) <= distance_m;
   });
@@ -125,7 +125,7 @@ Points near_to(const Plane& plane, const Points& points, double distance_m) {
 /// The vertical plane through two of the points that has most of them near it; a point counts by
 /// 1 - (d / kInlier_m)^2 (MSAC, P. Torr, A. Zisserman, CVIU 78(1), 2000), so that a plane askew
 /// between two copies of a wall does not win against one of them.
-std::optional<Plane> vote(const Points& points) {
+std::optional<Plane> vote(const PlanePoints& points) {
   std::mt19937 random(1);  // seeded alike for every cell: its result depends on its points only
   std::optional<Plane> best;
   double most = 0.0;
@@ -150,7 +150,7 @@ std::optional<Plane> vote(const Points& points) {
   return best;
 }
 
-Plane fit(const Points& points) {
+Plane fit(const PlanePoints& points) {
   Vector3d mean = Vector3d::Zero();
   for (const Vector3d& p : points) {
     mean += p / static_cast<double>(points.size());
@@ -163,11 +163,11 @@ Plane fit(const Points& points) {
 }
 
 /// The plane of its own inliers, from the best vote on.
-std::optional<Plane> find_plane(const Points& points) {
+std::optional<Plane> find_plane(const PlanePoints& points) {
   std::optional<Plane> plane = vote(points);
   std::size_t before = 0;
   for (int i = 0; plane && i < kMostFits; ++i) {
-    const Points inliers = near_to(*plane, points, kInlier_m);
+    const PlanePoints inliers = near_to(*plane, points, kInlier_m);
     if (inliers.size() < 3) {
       return std::nullopt;
     }
@@ -181,7 +181,7 @@ std::optional<Plane> find_plane(const Points& points) {
 }
 
 /// Between the 5th and the 95th of a hundred points, along `direction`.
-double extent_m(const Points& points, const Vector3d& direction) {
+double extent_m(const PlanePoints& points, const Vector3d& direction) {
   std::vector<double> along;
   std::transform(points.begin(), points.end(), std::back_inserter(along), [&](const Vector3d& p) {
     return direction.dot(p);
@@ -190,7 +190,7 @@ double extent_m(const Points& points, const Vector3d& direction) {
   return at_rank(along, 0.95) - low;
 }
 
-bool is_facade(const Plane& plane, const Points& inliers, const Points& window) {
+bool is_facade(const Plane& plane, const PlanePoints& inliers, const PlanePoints& window) {
   const Vector3d along = plane.normal.cross(Vector3d::UnitZ()).normalized();
   return window.size() >= kLeastPoints && std::abs(plane.normal.z()) <= kMostTilt &&
          static_cast<double>(inliers.size()) >=
@@ -200,7 +200,7 @@ bool is_facade(const Plane& plane, const Points& inliers, const Points& window) 
 }
 
 /// The wall of a cell; nullopt when it holds none.
-std::optional<Plane> facade_in(const Points& points) {
+std::optional<Plane> facade_in(const PlanePoints& points) {
   const std::optional<Plane> plane = find_plane(points);
   const bool is_wall =
       plane &&
@@ -214,12 +214,12 @@ bool is_own(const Plane& plane, const CellKey& key) {
          index_of(plane.centre_m.y(), kCell_m) == key[1];
 }
 
-std::optional<double> thickness_in(const CellKey& key, const Points& points) {
+std::optional<double> thickness_in(const CellKey& key, const PlanePoints& points) {
   const std::optional<Plane> plane = facade_in(points);
   if (!plane || !is_own(*plane, key)) {
     return std::nullopt;
   }
-  const Points window = near_to(*plane, points, kWindow_m);
+  const PlanePoints window = near_to(*plane, points, kWindow_m);
   std::vector<double> distances_m;
   for (const Vector3d& p : window) {
     distances_m.push_back(plane->distance_m(p));
@@ -229,7 +229,9 @@ std::optional<double> thickness_in(const CellKey& key, const Points& points) {
 }
 
 /// From the first cloud's wall to the second's, along its normal.
-std::optional<double> offset_in(const CellKey& key, const Points& first, const Points& second) {
+std::optional<double> offset_in(const CellKey& key,
+                                const PlanePoints& first,
+                                const PlanePoints& second) {
   const std::optional<Plane> of_first = facade_in(first);
   const std::optional<Plane> of_second = of_first ? facade_in(second) : std::nullopt;
   if (!of_second || !is_own(*of_first, key) ||
@@ -249,7 +251,7 @@ std::optional<double> offset_in(const CellKey& key, const Points& first, const P
 std::map<FacadeCell, Facade> facades_of(const PointCloud& cloud) {
   std::map<FacadeCell, Facade> facades;
   for (const auto& [key, points] : fill_cells(cloud, 1.0)) {
-    const Points standing = upright(points);
+    const PlanePoints standing = upright(points);
     const std::optional<Plane> plane =
         standing.size() < kLeastPoints ? std::nullopt : facade_in(standing);
     if (plane) {
@@ -275,8 +277,9 @@ FacadeOffset facade_offset(const PointCloud& first, const PointCloud& second) {
   std::vector<double> offsets_m;
   for (const auto& [key, points] : of_first) {
     const auto same = of_second.find(key);
-    const Points standing = same == of_second.end() ? Points{} : upright(points);
-    const Points others = standing.size() < kLeastPoints ? Points{} : upright(same->second);
+    const PlanePoints standing = same == of_second.end() ? PlanePoints{} : upright(points);
+    const PlanePoints others =
+        standing.size() < kLeastPoints ? PlanePoints{} : upright(same->second);
     if (others.size() < kLeastPoints) {
       continue;
     }
@@ -301,7 +304,7 @@ PlaneThickness facade_thickness(const PointCloud& cloud, const PlaneThicknessOpt
   }
   std::vector<double> thicknesses_m;
   for (const auto& [key, points] : fill_cells(cloud, result.share_looked_at)) {
-    const Points standing = upright(points);
+    const PlanePoints standing = upright(points);
     if (standing.size() < kLeastPoints) {
       continue;
     }

@@ -19,19 +19,21 @@ namespace {
 
 namespace file = exporter::session_file;
 
-constexpr double kDegrees = 180.0 / std::numbers::pi;
+constexpr double kDegreesPerRadian = 180.0 / std::numbers::pi;
 /// A silence of the gate longer than this is nobody's choice.
 constexpr double kLongestRow_s = 2.0;
 
 std::string sigma_text(double yaw_sigma_rad, const std::array<double, 3>& sigma_m) {
-  return "yaw " + fixed(yaw_sigma_rad * kDegrees, 3) + " deg, east " + fixed(sigma_m[0], 3) +
-         " m, north " + fixed(sigma_m[1], 3) + " m, up " + fixed(sigma_m[2], 3) + " m";
+  return "yaw " + fixed(yaw_sigma_rad * kDegreesPerRadian, 3) + " deg, east " +
+         fixed(sigma_m[0], 3) + " m, north " + fixed(sigma_m[1], 3) + " m, up " +
+         fixed(sigma_m[2], 3) + " m";
 }
 
 std::string transform_text(const YawPose& T) {
-  return "yaw " + fixed(T.yaw_rad * kDegrees, 4) + " deg, translation (" + fixed(T.p.x(), 3) +
-         ", " + fixed(T.p.y(), 3) + ", " + fixed(T.p.z(), 3) + ") m, tilt (" +
-         fixed(T.tilt_rad.x() * kDegrees, 3) + ", " + fixed(T.tilt_rad.y() * kDegrees, 3) + ") deg";
+  return "yaw " + fixed(T.yaw_rad * kDegreesPerRadian, 4) + " deg, translation (" +
+         fixed(T.p.x(), 3) + ", " + fixed(T.p.y(), 3) + ", " + fixed(T.p.z(), 3) + ") m, tilt (" +
+         fixed(T.tilt_rad.x() * kDegreesPerRadian, 3) + ", " +
+         fixed(T.tilt_rad.y() * kDegreesPerRadian, 3) + ") deg";
 }
 
 /// Nearest rank: the smallest value that at least this share of the sorted values does not exceed.

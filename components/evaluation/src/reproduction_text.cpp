@@ -183,7 +183,7 @@ std::string dropouts_of(const DriveFigures& drive) {
   return text + ".";
 }
 
-std::string list_of(const std::vector<std::string>& sentences) {
+std::string modes_listed(const std::vector<std::string>& sentences) {
   std::string text;
   for (const std::string& sentence : sentences) {
     text += "- " + sentence + "\n";
@@ -199,7 +199,7 @@ std::string section_of(const DriveFigures& drive) {
             ", of which this drive is no copy: read the order of the columns, not the size.\n";
   }
   text += "\n" + table_of(drive) + claims_of(drive) + "\n";
-  return text + (drive.problems.empty() ? "" : "**Problems**\n\n" + list_of(drive.problems));
+  return text + (drive.problems.empty() ? "" : "**Problems**\n\n" + modes_listed(drive.problems));
 }
 
 constexpr const char* kExplained =

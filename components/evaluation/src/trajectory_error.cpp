@@ -16,7 +16,7 @@ namespace trigpoint::evaluation {
 
 namespace {
 
-constexpr double kDegrees = 180.0 / std::numbers::pi;
+constexpr double kErrorDegrees = 180.0 / std::numbers::pi;
 /// A spread of positions below this (m, rms) does not tell a direction.
 constexpr double kSmallestSpread_m = 1e-3;
 
@@ -112,7 +112,7 @@ RelativeError mean_over_segments(const std::vector<PosePair>& pairs,
 }
 
 double angle_deg(const Eigen::Quaterniond& q) {
-  return so3_log(q).norm() * kDegrees;
+  return so3_log(q).norm() * kErrorDegrees;
 }
 
 }  // namespace

@@ -15,17 +15,17 @@ namespace trigpoint::exporter {
 
 namespace {
 
-struct CloseDataset {
+struct CloseVectors {
   void operator()(GDALDataset* dataset) const { GDALClose(dataset); }
 };
 
-using Dataset = std::unique_ptr<GDALDataset, CloseDataset>;
+using Vectors = std::unique_ptr<GDALDataset, CloseVectors>;
 using Feature = std::unique_ptr<OGRFeature>;
 
-Dataset create(const char* driver_name, const std::string& file) {
+Vectors create(const char* driver_name, const std::string& file) {
   GDALDriver* driver = GetGDALDriverManager()->GetDriverByName(driver_name);
   GdalErrors::check(driver != nullptr, file, std::string("find GDAL's driver ") + driver_name);
-  Dataset dataset(driver->Create(file.c_str(), 0, 0, 0, GDT_Unknown, nullptr));
+  Vectors dataset(driver->Create(file.c_str(), 0, 0, 0, GDT_Unknown, nullptr));
   GdalErrors::check(dataset != nullptr, file, "create");
   return dataset;
 }
@@ -101,7 +101,7 @@ class MemoryFile {
  private:
   std::string file_;
   std::string path_;
-  Dataset dataset_;
+  Vectors dataset_;
 };
 
 }  // namespace

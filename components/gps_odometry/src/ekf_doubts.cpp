@@ -15,18 +15,18 @@ namespace {
 using Eigen::Vector3d;
 
 // Rest, as for the gyro's bias (research/gps C5).
-constexpr double kRestSpeed_mps = 0.3;
-constexpr double kRestRate_radps = 0.03;
+constexpr double kEkfRestSpeed_mps = 0.3;
+constexpr double kEkfRestRate_radps = 0.03;
 constexpr double kMostUpError_mps2 = 0.3;
 
 // The same sizes as eskf18's.
 constexpr double kDoubtHold_s = 30.0;
 constexpr double kDoubtDecay_s = 5.0;  // after that
 constexpr double kBetterClassDecay_s = 20.0;
-constexpr double kWrongFix_m = 0.5;      // wrong ambiguities: 15 % of re-fixes, 0.4 to 1.6 m
-constexpr double kReadmission_m = 10.0;  // step after an outage that is doubted
-constexpr double kOutage_s = 3.0;        // without fixes, after which the receiver is another one
-constexpr int kContradictions = 2;       // refused fixes that are more than a spike
+constexpr double kEkfWrongFix_m = 0.5;      // wrong ambiguities: 15 % of re-fixes, 0.4 to 1.6 m
+constexpr double kEkfReadmission_m = 10.0;  // step after an outage that is doubted
+constexpr double kOutage_s = 3.0;   // without fixes, after which the receiver is another one
+constexpr int kContradictions = 2;  // refused fixes that are more than a spike
 // More says no more, and beside variances of 1e-4 m^2 the matrix would lose its small eigenvalues
 // to rounding (1e12 times 2e-16 is 2e-4).
 constexpr double kMostDoubt_m2 = kUnknownVariance;
@@ -50,9 +50,9 @@ void raise_doubt(EkfTrack& track, const Vector3d& step_m, Nanoseconds stamp_ns) 
 /// At rest the accelerometer measures gravity: what it measures too much would be taken for a
 /// climb. Of the other axes it would tell tilt and bias together.
 void EkfTracker::learn_at_rest(EkfTrack& track, const QuietWindow& quiet) const {
-  const bool is_slow = track.accepted_ns == 0 || speed_mps(track) < kRestSpeed_mps;
+  const bool is_slow = track.accepted_ns == 0 || speed_mps(track) < kEkfRestSpeed_mps;
   const double up_mps2 = quiet.mean_accel_mps2.norm() - kGravity_mps2;
-  if (is_slow && quiet.mean_gyro_radps.norm() < kRestRate_radps &&
+  if (is_slow && quiet.mean_gyro_radps.norm() < kEkfRestRate_radps &&
       std::abs(up_mps2) < kMostUpError_mps2) {
     track.up_error_mps2 = up_mps2;
     track.knows_up_error = true;
@@ -66,7 +66,7 @@ void EkfTracker::doubt_step(EkfTrack& track, const MapFix& fix) const {
   const double age_s = to_seconds(fix.checked.stamp_ns - track.accepted_ns);
   const Vector3d step = fix.antenna_map_m - expected_antenna(track.filter.x, lever_base_m_);
   const double least_m =
-      kReadmission_m + 3.0 * std::sqrt(fix.covariance_map_m2.diagonal().maxCoeff());
+      kEkfReadmission_m + 3.0 * std::sqrt(fix.covariance_map_m2.diagonal().maxCoeff());
   // Before the first accepted fix nothing but another filter's word is contradicted.
   if (track.accepted_ns > 0 && age_s > kOutage_s && step.norm() > least_m) {
     raise_doubt(track, step, fix.checked.stamp_ns);
@@ -161,7 +161,7 @@ void EkfTracker::hold_reported(EkfTrack& track, const MapFix& fix, double elapse
   const double keep = std::exp(-std::clamp(elapsed_s, 0.0, 60.0) / kBetterClassDecay_s);
   track.held_m2 = now.cwiseMax(keep * track.held_m2 + (1.0 - keep) * now);
   if (elapsed_s > kOutage_s && track.phase == Phase::kRunning) {
-    track.held_m2 = track.held_m2.cwiseMax(Vector3d::Constant(kWrongFix_m * kWrongFix_m));
+    track.held_m2 = track.held_m2.cwiseMax(Vector3d::Constant(kEkfWrongFix_m * kEkfWrongFix_m));
   }
   track.fix_m2 = now;
 }

@@ -20,12 +20,12 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kTiltSigma_rad = 0.1;  // of a first levelling in motion
-constexpr double kUnknownYaw_rad = std::numbers::pi;
-constexpr double kLongGap_s = 1.0;     // IMU gap after which attitude and velocity are doubted
-constexpr double kRestartGap_s = 5.0;  // IMU gap after which nothing is left
-constexpr double kTeleportMargin_m = 5.0;
-constexpr double kAligningSpeedSigma_mps = 1.0;
+constexpr double kEkfTiltSigma_rad = 0.1;  // of a first levelling in motion
+constexpr double kEkfUnknownYaw_rad = std::numbers::pi;
+constexpr double kEkfLongGap_s = 1.0;     // IMU gap after which attitude and velocity are doubted
+constexpr double kEkfRestartGap_s = 5.0;  // IMU gap after which nothing is left
+constexpr double kEkfTeleportMargin_m = 5.0;
+constexpr double kEkfAligningSpeedSigma_mps = 1.0;
 constexpr double kGyroBiasGrowth = 3.3;
 constexpr double kAccelBiasGrowth = 3.0;
 constexpr double kIgnoredHeight_m2 = 1e8;
@@ -54,8 +54,8 @@ void EkfTracker::start(EkfTrack& track, const CheckedImu& imu) const {
   track.filter.x.segment<3>(kAttitude) = roll_pitch_yaw_of(from_yaw(-yaw_of(level)) * level);
   track.filter.x.segment<3>(kRate) = imu.gyro_radps;
   Vector15d sigma;
-  sigma << 1.0, 1.0, 1.0, kTiltSigma_rad, kTiltSigma_rad, 1e-3, 3.0, 3.0, 1.0, 0.1, 0.1, 0.1, 1.0,
-      1.0, 1.0;
+  sigma << 1.0, 1.0, 1.0, kEkfTiltSigma_rad, kEkfTiltSigma_rad, 1e-3, 3.0, 3.0, 1.0, 0.1, 0.1, 0.1,
+      1.0, 1.0, 1.0;
   track.filter.P = sigma.cwiseAbs2().asDiagonal();
   track.heading.restart();
   track.aiding = AidingState{};
@@ -104,14 +104,14 @@ void EkfTracker::advance(EkfTrack& track, Nanoseconds stamp_ns) const {
 
 void EkfTracker::apply(EkfTrack& track, const CheckedImu& imu) const {
   const double gap_s = to_seconds(imu.stamp_ns - track.imu_ns);
-  if (track.phase == Phase::kNoImu || gap_s > kRestartGap_s) {
+  if (track.phase == Phase::kNoImu || gap_s > kEkfRestartGap_s) {
     start(track, imu);
   } else {
     advance(track, imu.stamp_ns);
-    if (gap_s > kLongGap_s) {
+    if (gap_s > kEkfLongGap_s) {
       reset_block(track.filter, kVelocity, Matrix3d::Identity() * 9.0);
       track.filter.P.block<3, 3>(kAttitude, kAttitude).diagonal().array() +=
-          gap_s * kTiltSigma_rad * kTiltSigma_rad;
+          gap_s * kEkfTiltSigma_rad * kEkfTiltSigma_rad;
     }
     if (imu.quiet) {
       learn_at_rest(track, *imu.quiet);
@@ -179,7 +179,7 @@ double EkfTracker::teleport_limit_m(const EkfTrack& track, const MapFix& fix) co
   const double elapsed_s = to_seconds(fix.checked.stamp_ns - track.accepted_ns);
   const double variance = fix.covariance_map_m2.diagonal().maxCoeff() +
                           track.accepted_covariance_map_m2.diagonal().maxCoeff();
-  return config_.highest_speed_mps * std::abs(elapsed_s) + kTeleportMargin_m +
+  return config_.highest_speed_mps * std::abs(elapsed_s) + kEkfTeleportMargin_m +
          5.0 * std::sqrt(variance);
 }
 
@@ -233,7 +233,7 @@ void EkfTracker::begin_running(EkfTrack& track,
   filter.x.segment<3>(kPosition) = fix.antenna_map_m - lever_map;
   const Matrix3d lever_part =
       lever_map.squaredNorm() *
-      (kTiltSigma_rad * kTiltSigma_rad + heading.sigma_rad * heading.sigma_rad) *
+      (kEkfTiltSigma_rad * kEkfTiltSigma_rad + heading.sigma_rad * heading.sigma_rad) *
       Matrix3d::Identity();
   reset_block(filter, kPosition, fix.covariance_map_m2 + lever_part);
   track.phase = Phase::kRunning;
@@ -260,7 +260,7 @@ FixOutcome EkfTracker::filter_fix(EkfTrack& track, const MapFix& fix) const {
   }
   const double limit_m =
       config_.highest_speed_mps * std::abs(to_seconds(fix.checked.stamp_ns - track.accepted_ns)) +
-      kTeleportMargin_m + 5.0 * std::sqrt(S.diagonal().maxCoeff());
+      kEkfTeleportMargin_m + 5.0 * std::sqrt(S.diagonal().maxCoeff());
   const double distance2 =
       innovation.head<2>().dot(S.topLeftCorner<2, 2>().ldlt().solve(innovation.head<2>()));
   if (innovation.norm() > limit_m) {
@@ -369,14 +369,14 @@ PoseCovariance EkfTracker::pose_covariance(const EkfTrack& track) const {
   }
   PoseCovariance aligning = PoseCovariance::Zero();
   const double age_s = std::max(0.0, to_seconds(track.stamp_ns - track.accepted_ns));
-  const double moved_m = age_s * (track.speed_mps + kAligningSpeedSigma_mps);
+  const double moved_m = age_s * (track.speed_mps + kEkfAligningSpeedSigma_mps);
   aligning.topLeftCorner<3, 3>() =
       track.accepted_covariance_map_m2 + moved_m * moved_m * Matrix3d::Identity();
   aligning.topLeftCorner<2, 2>() +=
       lever_base_m_.head<2>().squaredNorm() * Eigen::Matrix2d::Identity();
   // Roll and pitch about axes of unknown direction.
   const double tilt = covariance.diagonal().segment<2>(3).maxCoeff();
-  aligning.diagonal().tail<3>() << tilt, tilt, kUnknownYaw_rad * kUnknownYaw_rad;
+  aligning.diagonal().tail<3>() << tilt, tilt, kEkfUnknownYaw_rad * kEkfUnknownYaw_rad;
   return aligning;
 }
 
@@ -388,7 +388,7 @@ Matrix6d EkfTracker::twist_covariance(const EkfTrack& track) const {
 double EkfTracker::yaw_sigma_rad(const EkfTrack& track) const {
   return track.phase == Phase::kRunning
              ? std::sqrt(std::max(0.0, track.filter.P(kAttitude + 2, kAttitude + 2)))
-             : kUnknownYaw_rad;
+             : kEkfUnknownYaw_rad;
 }
 
 Estimate EkfTracker::estimate(const EkfTrack& track) const {

@@ -26,7 +26,7 @@ constexpr double kCourseSigma_rad = 0.035;
 constexpr double kProofBaseline = 4.0;
 constexpr double kContradiction_rad = 0.35;
 constexpr double kContradiction_sigmas = 3.0;
-constexpr Nanoseconds kDistrust_ns = 60 * kNanosecondsPerSecond;
+constexpr Nanoseconds kHeadingDistrust_ns = 60 * kNanosecondsPerSecond;
 constexpr double kLongestStep_s = 2.5;
 
 Complex complex_of(const Eigen::Vector2d& v) {
@@ -136,7 +136,7 @@ std::optional<HeadingEstimate> contradiction(HeadingSearch& search,
   if (std::abs(wrap_angle(motion->yaw_map_relative_rad)) < limit) {
     return std::nullopt;
   }
-  aiding.yaw_distrusted_until_ns = point.stamp_ns + kDistrust_ns;
+  aiding.yaw_distrusted_until_ns = point.stamp_ns + kHeadingDistrust_ns;
   return motion;
 }
 

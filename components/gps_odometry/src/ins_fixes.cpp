@@ -23,7 +23,7 @@ constexpr double kTeleportMargin_m = 5.0;
 constexpr double kOtherReceiver = 2.0;   // ratio of variances that means another kind of solution
 constexpr double kDecided = 12.0;        // log of the likelihood ratio
 constexpr double kTurnRound = 4.0;       // the same, to exchange filter and rival
-constexpr double kWorstFit = 25.0;       // a bad fix speaks for neither heading
+constexpr double kWorstFixFit = 25.0;    // a bad fix speaks for neither heading
 constexpr double kWrongFix_m = 0.5;      // wrong ambiguities: 15 % of re-fixes, 0.4 to 1.6 m
 constexpr double kMostOfOneFix = 1.0;    // of log_ratio: first fits are bad for either heading
 constexpr double kReadmission_m = 10.0;  // step after an outage that is remembered
@@ -48,7 +48,7 @@ double distance2(const Vector3d& innovation, const Matrix3d& S, Part part) {
 /// -2 log of the innovation's density, but for a constant; outliers are cut off.
 double misfit(const Vector3d& innovation, const Matrix3d& S) {
   const Eigen::LDLT<Matrix3d> ldlt(S);
-  return std::min(innovation.dot(ldlt.solve(innovation)), kWorstFit) +
+  return std::min(innovation.dot(ldlt.solve(innovation)), kWorstFixFit) +
          ldlt.vectorD().array().log().sum();
 }
 

@@ -13,7 +13,7 @@ namespace trigpoint::gps_odometry {
 
 namespace {
 
-constexpr double kLongestStep_s = 0.2;
+constexpr double kLongestTurnStep_s = 0.2;
 constexpr Nanoseconds kYawInterval_ns = kNanosecondsPerSecond / 20;
 constexpr Nanoseconds kYawHistory_ns = 2 * kNanosecondsPerSecond;
 constexpr double kLeg_m = 2.0;
@@ -38,7 +38,7 @@ void TurnCheck::add_imu(Nanoseconds stamp_ns,
                         const Eigen::Vector3d& up_base) {
   const double elapsed_s = imu_ns_ ? to_seconds(stamp_ns - *imu_ns_) : 0.0;
   imu_ns_ = stamp_ns;
-  if (elapsed_s < 0.0 || elapsed_s > kLongestStep_s) {
+  if (elapsed_s < 0.0 || elapsed_s > kLongestTurnStep_s) {
     restart();
     imu_ns_ = stamp_ns;
     return;

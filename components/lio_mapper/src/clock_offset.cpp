@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kWindow_s = 3.0;
 constexpr std::size_t kFewest = 12;  ///< scans in a window that counts
-constexpr double kLongestStep_s = 0.02;
+constexpr double kLongestClockStep_s = 0.02;
 /// A longer interval between two scans ends the window.
 constexpr double kLongestPause_s = 0.35;
 constexpr double kPriorOffset_s = 0.1;
@@ -76,8 +76,9 @@ void ClockOffsetEstimator::add(Nanoseconds stamp_ns,
   if (ends) {
     interrupt();
   }
-  const auto steps = window_.empty() ? imu.steps_between(stamp_ns - 1, stamp_ns, kLongestStep_s)
-                                     : imu.steps_between(newest_ns_, stamp_ns, kLongestStep_s);
+  const auto steps = window_.empty()
+                         ? imu.steps_between(stamp_ns - 1, stamp_ns, kLongestClockStep_s)
+                         : imu.steps_between(newest_ns_, stamp_ns, kLongestClockStep_s);
   if (steps.empty()) {
     return;
   }

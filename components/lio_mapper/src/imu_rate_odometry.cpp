@@ -10,7 +10,7 @@ using Eigen::Matrix3d;
 
 namespace {
 
-constexpr double kLongestStep_s = 0.02;
+constexpr double kLongestImuRateStep_s = 0.02;
 
 Matrix6d in_ros_order(const State& state, const ErrorMatrix& covariance) {
   Matrix6d to_odom = Matrix6d::Identity();
@@ -63,7 +63,8 @@ void ImuRateOdometry::catch_up(const ImuBuffer& imu) {
     return;
   }
   const double gap_s = imu.longest_gap_s(stamp_ns_, imu.newest_ns());
-  for (const InertialStep& step : imu.steps_between(stamp_ns_, imu.newest_ns(), kLongestStep_s)) {
+  for (const InertialStep& step :
+       imu.steps_between(stamp_ns_, imu.newest_ns(), kLongestImuRateStep_s)) {
     propagate_covariance(
         step_jacobian(state_, step), imu_, noise_of(imu_, step, gap_s), covariance_);
     state_ = propagate(state_, step);

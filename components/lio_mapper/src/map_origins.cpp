@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kSide_m = 1.0;
 /// Then the mean is frozen, about when the map's own leaves are.
-constexpr double kMostPoints = 80.0;
+constexpr double kMostMapPoints = 80.0;
 
 /// The pose at `share` of the way.
 Pose between(const Pose& from, const Pose& to, double share) {
@@ -40,7 +40,7 @@ void MapOrigins::insert(const PointCloud& points_odom,
       continue;
     }
     Mean& mean = voxels_[*key];
-    if (mean.count >= kMostPoints) {
+    if (mean.count >= kMostMapPoints) {
       continue;
     }
     mean.count += 1.0;

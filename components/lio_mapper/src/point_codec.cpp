@@ -22,7 +22,7 @@ constexpr std::size_t kHead = 4;     // number of points
 constexpr int kLevel = 3;            // higher ones gain 2 % for several times the time
 constexpr double kFarthest_m = 1e6;
 /// No sweep has more points; keeps a damaged length from filling the memory.
-constexpr std::size_t kMostPoints = 50'000'000;
+constexpr std::size_t kMostCodedPoints = 50'000'000;
 
 std::int32_t steps_of(float coordinate_m) {
   if (!(std::abs(static_cast<double>(coordinate_m)) < kFarthest_m)) {
@@ -131,7 +131,7 @@ PointCloud unpack_points(const void* bytes, std::size_t size) {
   const std::size_t count = packed_count(bytes, size);
   const auto* frame = static_cast<const std::uint8_t*>(bytes) + kHead;
   const std::size_t planes_size = kPlanes * count;
-  if (count > kMostPoints || ZSTD_getFrameContentSize(frame, size - kHead) != planes_size) {
+  if (count > kMostCodedPoints || ZSTD_getFrameContentSize(frame, size - kHead) != planes_size) {
     throw std::runtime_error("does not hold the " + std::to_string(count) +
                              " points that it names");
   }

@@ -33,7 +33,7 @@ constexpr std::size_t kRefined = 16;
 /// Two places or headings that differ by less are the same one.
 constexpr double kSame_m = 1.0;
 constexpr double kSame_rad = 0.05;
-constexpr double kOnPlane_m = 0.1;
+constexpr double kFoundOnPlane_m = 0.1;
 constexpr std::int64_t kMaxIterations = 20;
 constexpr double kPriorPosition_m = 0.7;
 constexpr double kPriorLevel_rad = 0.01;
@@ -222,7 +222,7 @@ void judge(const Parts& parts,
     const double variance = matching.range_sigma_m * matching.range_sigma_m +
                             sideways_m * sideways_m + plane.thickness2_m2;
     ++matched;
-    if (std::abs(r) < kOnPlane_m) {  // what lies farther off speaks against the fit already
+    if (std::abs(r) < kFoundOnPlane_m) {  // what lies farther off speaks against the fit already
       ++near;
       chi2 += r * r / variance;
     }

@@ -21,7 +21,7 @@ constexpr double kRestForceChange_mps2 = 0.1;
 /// A speed must fit this much better (share of points) than standing still to be believed.
 constexpr double kClearlyBetter = 0.03;
 constexpr double kBackwardSpeed_mps = 4.0;
-constexpr double kLongestStep_s = 0.02;
+constexpr double kLongestStillStep_s = 0.02;
 constexpr double kTiltMoving_rad = 0.1;
 /// The trial matches against a map that its own first motion built.
 constexpr double kTrialSigmaFactor = 2.0;
@@ -56,7 +56,7 @@ Trial try_start(const Config& config,
   filter.insert(filter.process(sweeps[0], imu));
   State unaided = filter.state();
   for (const InertialStep& step :
-       imu.steps_between(filter.stamp_ns(), sweeps[1].end_ns, kLongestStep_s)) {
+       imu.steps_between(filter.stamp_ns(), sweeps[1].end_ns, kLongestStillStep_s)) {
     unaided = propagate(unaided, step);
   }
   const ScanOutcome outcome = filter.process(sweeps[1], imu);
@@ -118,7 +118,7 @@ Relevelled relevel(const Config& config,
   unaided.T_odom_base = initial.state.T_odom_base;
   unaided.v_odom_mps.setZero();
   for (const InertialStep& step :
-       imu.steps_between(initial.stamp_ns, filter.stamp_ns(), kLongestStep_s)) {
+       imu.steps_between(initial.stamp_ns, filter.stamp_ns(), kLongestStillStep_s)) {
     unaided = propagate(unaided, step);
   }
   const Eigen::Quaterniond q_base_odom = initial.state.T_odom_base.q.conjugate();
@@ -136,7 +136,7 @@ Nanoseconds start_stamp(const ImuBuffer& imu, const std::deque<Sweep>& sweeps) {
 
 ImuSummary summarize(const ImuBuffer& imu, Nanoseconds from_ns, Nanoseconds to_ns) {
   ImuSummary summary;
-  const auto steps = imu.steps_between(from_ns, to_ns, kLongestStep_s);
+  const auto steps = imu.steps_between(from_ns, to_ns, kLongestStillStep_s);
   summary.count = steps.size();
   if (steps.empty()) {
     return summary;
@@ -265,7 +265,7 @@ StartResult start(const Config& configured,
   // The summary is in base axes at the window's end; the start is at stamp_ns.
   const auto turn = [&](Nanoseconds a, Nanoseconds b) {
     Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
-    for (const InertialStep& step : imu.steps_between(a, b, kLongestStep_s)) {
+    for (const InertialStep& step : imu.steps_between(a, b, kLongestStillStep_s)) {
       q = q * so3_exp(0.5 * step.duration_s() * (step.begin.gyro_radps + step.end.gyro_radps));
     }
     return q.normalized();

@@ -22,8 +22,8 @@ namespace topics = bus::topics;
 using WallClock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
-constexpr std::uint64_t kImuBurst = 100;
-constexpr Nanoseconds kClockPeriod_ns = 10'000'000;
+constexpr std::uint64_t kFilterImuBurst = 100;
+constexpr Nanoseconds kFilterClockPeriod_ns = 10'000'000;
 constexpr std::uint64_t kGiveUpAnswers = 5;  // a filter without gps/status is not waited for
 constexpr auto kStragglers = 500ms;
 
@@ -110,13 +110,13 @@ class FilterDriver {
   void publish(const LogEntry& entry) {
     wait_for_time(entry.receive_ns);
     notes_.reach(entry.receive_ns);
-    if (entry.receive_ns - clock_ns_ >= kClockPeriod_ns) {
+    if (entry.receive_ns - clock_ns_ >= kFilterClockPeriod_ns) {
       clock_ns_ = entry.receive_ns;
       clock_.publish(bus::to_clock_message(entry.receive_ns));
     }
     if (const auto* sample = std::get_if<ImuSample>(&entry.measurement)) {
       imu_.publish(bus::to_message(*sample));
-      if (++imu_count_ % kImuBurst == 0) {
+      if (++imu_count_ % kFilterImuBurst == 0) {
         imu_.wait_for_acknowledgments(options_.patience);
       }
     } else if (const auto* fix = std::get_if<GnssFix>(&entry.measurement)) {

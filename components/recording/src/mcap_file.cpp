@@ -54,7 +54,7 @@ std::string seconds(Nanoseconds time_ns) {
 }
 
 /// A message in the records of its block.
-struct Place {
+struct PlaceInFile {
   Nanoseconds time_ns{0};
   std::uint64_t offset{0};  ///< of its data
   std::uint64_t size{0};
@@ -64,7 +64,7 @@ struct Place {
 /// A block whose messages are not all delivered.
 struct Open {
   std::vector<std::uint8_t> records;  ///< empty: to be read again
-  std::vector<Place> places;          ///< in order of time
+  std::vector<PlaceInFile> places;    ///< in order of time
   std::size_t at{0};
 };
 
@@ -200,7 +200,7 @@ class McapFile : public BagFile {
       }
       bool any = false;
       const auto places = places_in(*records, block);
-      for (const Place& place : places) {
+      for (const PlaceInFile& place : places) {
         ++counts_[place.channel_id];
         block.first_ns = any ? std::min(block.first_ns, place.time_ns) : place.time_ns;
         block.last_ns = any ? std::max(block.last_ns, place.time_ns) : place.time_ns;
@@ -258,8 +258,8 @@ class McapFile : public BagFile {
   }
 
   /// All messages in the records, in their order there; notes channels and schemas on the way.
-  std::vector<Place> places_in(const std::vector<std::uint8_t>& records, const Block& block) {
-    std::vector<Place> places;
+  std::vector<PlaceInFile> places_in(const std::vector<std::uint8_t>& records, const Block& block) {
+    std::vector<PlaceInFile> places;
     Bytes rest(records);
     while (!rest.empty()) {
       const auto record = mcap::take_record(rest);
@@ -276,7 +276,7 @@ class McapFile : public BagFile {
   bool take(Op op,
             Bytes record,
             const std::vector<std::uint8_t>& records,
-            std::vector<Place>& places) {
+            std::vector<PlaceInFile>& places) {
     if (op == Op::kMessage) {
       const auto head = mcap::parse_message_head(record);
       if (head) {
@@ -300,11 +300,13 @@ class McapFile : public BagFile {
     Open open{std::move(*records), {}, 0};
     open.places = places_in(open.records, block);
     seen_messages_ += open.places.size();
-    std::erase_if(open.places,
-                  [this](const Place& place) { return selected_.count(place.channel_id) == 0; });
-    std::stable_sort(open.places.begin(), open.places.end(), [](const Place& a, const Place& b) {
-      return a.time_ns < b.time_ns;
+    std::erase_if(open.places, [this](const PlaceInFile& place) {
+      return selected_.count(place.channel_id) == 0;
     });
+    std::stable_sort(
+        open.places.begin(), open.places.end(), [](const PlaceInFile& a, const PlaceInFile& b) {
+          return a.time_ns < b.time_ns;
+        });
     if (open.places.empty()) {
       return;
     }
@@ -328,7 +330,7 @@ class McapFile : public BagFile {
   /// A chunk that lies about its beginning comes too late; its messages are not lost for that, but
   /// their arrival is no earlier than what was delivered before. nullopt when the disk has lost it.
   std::optional<RawMessage> message_of(std::size_t block, Open& open) {
-    const Place& place = open.places[open.at];
+    const PlaceInFile& place = open.places[open.at];
     if (open.records.empty()) {
       auto records = records_of(layout_.blocks[block], nullptr);
       if (!records) {

@@ -19,9 +19,9 @@ namespace {
 
 struct EndOfBytes : std::exception {};
 
-class Bytes {
+class Ros1Bytes {
  public:
-  explicit Bytes(std::span<const std::uint8_t> bytes) : rest_(bytes) {}
+  explicit Ros1Bytes(std::span<const std::uint8_t> bytes) : rest_(bytes) {}
 
   std::span<const std::uint8_t> take(std::size_t count) {
     if (count > rest_.size()) {
@@ -59,7 +59,7 @@ class Bytes {
 
 /// std_msgs/Header: seq, stamp, frame_id.
 template <class Message>
-void read_header(Bytes& bytes, Message& message) {
+void read_header(Ros1Bytes& bytes, Message& message) {
   bytes.number<std::uint32_t>();
   const auto seconds = bytes.number<std::uint32_t>();
   const auto nanoseconds = bytes.number<std::uint32_t>();
@@ -77,7 +77,7 @@ std::optional<Eigen::Quaterniond> attitude(const Eigen::Vector4d& xyzw, double f
   return Eigen::Quaterniond(xyzw[3], xyzw[0], xyzw[1], xyzw[2]).normalized();
 }
 
-ImuSample read_imu(Bytes& bytes) {
+ImuSample read_imu(Ros1Bytes& bytes) {
   ImuSample imu;
   read_header(bytes, imu);
   const auto orientation = bytes.numbers<4>();
@@ -89,7 +89,7 @@ ImuSample read_imu(Bytes& bytes) {
   return imu;
 }
 
-GnssFix read_fix(Bytes& bytes) {
+GnssFix read_fix(Ros1Bytes& bytes) {
   GnssFix fix;
   read_header(bytes, fix);
   const auto status = bytes.number<std::int8_t>();
@@ -106,7 +106,7 @@ GnssFix read_fix(Bytes& bytes) {
   return fix;
 }
 
-PointField read_field(Bytes& bytes) {
+PointField read_field(Ros1Bytes& bytes) {
   PointField field;
   field.name = bytes.text();
   field.offset = bytes.number<std::uint32_t>();
@@ -115,7 +115,7 @@ PointField read_field(Bytes& bytes) {
   return field;
 }
 
-PointCloudMessage read_cloud(Bytes& bytes) {
+PointCloudMessage read_cloud(Ros1Bytes& bytes) {
   PointCloudMessage cloud;
   read_header(bytes, cloud);
   cloud.height = bytes.number<std::uint32_t>();
@@ -136,7 +136,7 @@ Matrix6d matrix6(const Eigen::Matrix<double, 36, 1>& row_major) {
   return Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(row_major.data());
 }
 
-TwistMeasurement read_twist(Bytes& bytes) {
+TwistMeasurement read_twist(Ros1Bytes& bytes) {
   TwistMeasurement twist;
   read_header(bytes, twist);
   twist.linear_mps = bytes.numbers<3>();
@@ -145,7 +145,7 @@ TwistMeasurement read_twist(Bytes& bytes) {
   return twist;
 }
 
-Odometry read_odometry(Bytes& bytes) {
+Odometry read_odometry(Ros1Bytes& bytes) {
   Odometry odometry;
   read_header(bytes, odometry);
   odometry.child_frame_id = bytes.text();
@@ -160,7 +160,7 @@ Odometry read_odometry(Bytes& bytes) {
 }
 
 /// The orientation as it came: the filter judges its length.
-YawMeasurement read_yaw(Bytes& bytes) {
+YawMeasurement read_yaw(Ros1Bytes& bytes) {
   YawMeasurement yaw;
   read_header(bytes, yaw);
   const auto xyzw = bytes.numbers<4>();
@@ -174,9 +174,9 @@ YawMeasurement read_yaw(Bytes& bytes) {
 }
 
 template <class Message>
-bool decode(std::span<const std::uint8_t> bytes, Message& message, Message (*read)(Bytes&)) {
+bool decode(std::span<const std::uint8_t> bytes, Message& message, Message (*read)(Ros1Bytes&)) {
   try {
-    Bytes cursor(bytes);
+    Ros1Bytes cursor(bytes);
     message = read(cursor);
     return true;
   } catch (const EndOfBytes&) {

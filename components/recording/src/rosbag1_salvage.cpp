@@ -26,7 +26,7 @@ constexpr char kVersionLine[] = "#ROSBAG V2.0\n";
 constexpr std::uint32_t kLongestHeader = 1U << 20U;
 constexpr std::uint32_t kLargestData = 1U << 30U;
 
-enum class Op : std::uint8_t { kMessage = 2, kChunk = 5, kConnection = 7 };
+enum class BagOp : std::uint8_t { kMessage = 2, kChunk = 5, kConnection = 7 };
 
 using View = std::span<const std::uint8_t>;
 
@@ -101,7 +101,7 @@ std::optional<std::vector<std::uint8_t>> unpacked(const Fields& fields, View dat
 struct Record {
   Fields fields;
   View data;
-  Op op;
+  BagOp op;
 };
 
 std::optional<Record> take_record(View& rest) {
@@ -110,8 +110,8 @@ std::optional<Record> take_record(View& rest) {
   if (!data) {
     return std::nullopt;
   }
-  Record record{parse_fields(*header), *data, Op::kMessage};
-  record.op = static_cast<Op>(number_in<std::uint8_t>(record.fields, "op").value_or(0));
+  Record record{parse_fields(*header), *data, BagOp::kMessage};
+  record.op = static_cast<BagOp>(number_in<std::uint8_t>(record.fields, "op").value_or(0));
   return record;
 }
 
@@ -231,7 +231,7 @@ class SalvagedBag : public Ros1Source {
         rest = *bytes;
       }
       const auto record = take_record(rest);
-      if (!record || (record->op == Op::kChunk && !scan_chunk(whole, *record))) {
+      if (!record || (record->op == BagOp::kChunk && !scan_chunk(whole, *record))) {
         return;
       }
       note_connection(*record);
@@ -247,7 +247,7 @@ class SalvagedBag : public Ros1Source {
     View rest(*content);
     while (const auto inner = take_record(rest)) {
       note_connection(*inner);
-      if (inner->op == Op::kMessage) {
+      if (inner->op == BagOp::kMessage) {
         note_message(*inner, static_cast<std::size_t>(inner->data.data() - content->data()));
       }
     }
@@ -257,7 +257,7 @@ class SalvagedBag : public Ros1Source {
 
   void note_connection(const Record& record) {
     const auto id = number_in<std::uint32_t>(record.fields, "conn");
-    if (record.op == Op::kConnection && id) {
+    if (record.op == BagOp::kConnection && id) {
       const std::string topic = text_in(record.fields, "topic");
       connections_[*id] = topic;
       types_[topic] = ros2_type_name(text_in(parse_fields(record.data), "type"));

@@ -33,13 +33,13 @@ void make_folder(const fs::path& folder) {
 }
 
 /// Where a recording lies.
-struct Place {
+struct BagPlace {
   fs::path path;  ///< the folder, or the file when there is none
   fs::path file;
   bool in_folder{true};  ///< with metadata.yaml beside it
 };
 
-Place new_folder(const fs::path& folder, const char* extension) {
+BagPlace new_folder(const fs::path& folder, const char* extension) {
   make_folder(folder);
   if (!fs::is_empty(folder)) {
     throw LogError(folder.string() +
@@ -50,7 +50,7 @@ Place new_folder(const fs::path& folder, const char* extension) {
   return {path, path / (name.string() + "_0" + extension), true};
 }
 
-Place new_file(const fs::path& file) {
+BagPlace new_file(const fs::path& file) {
   const fs::path path = fs::absolute(file).lexically_normal();
   if (fs::exists(path)) {
     throw LogError(path.string() +
@@ -60,7 +60,7 @@ Place new_file(const fs::path& file) {
   return {path, path, false};
 }
 
-Place new_place(const fs::path& path, Storage storage) {
+BagPlace new_place(const fs::path& path, Storage storage) {
   if (names_mcap_file(path.string())) {
     return new_file(path);
   }
@@ -79,7 +79,7 @@ bool names_mcap_file(const std::string& path) {
 
 class Rosbag2Writer::Bag {
  public:
-  Bag(const Place& place, Storage storage, std::uint64_t largest_bytes)
+  Bag(const BagPlace& place, Storage storage, std::uint64_t largest_bytes)
       : place_(place),
         storage_(storage),
         reserve_(place.file.string() + ".reserve"),
@@ -227,7 +227,7 @@ class Rosbag2Writer::Bag {
     output_.reset();
   }
 
-  Place place_;
+  BagPlace place_;
   Storage storage_;
   DiskReserve reserve_;
   std::unique_ptr<BagOutput> output_;

@@ -12,7 +12,7 @@ namespace trigpoint::recording {
 
 namespace {
 
-using View = std::span<const std::uint8_t>;
+using PageView = std::span<const std::uint8_t>;
 
 constexpr std::uint8_t kTableLeaf = 13;
 constexpr std::size_t kFileHeader_bytes = 100;
@@ -20,7 +20,7 @@ constexpr std::size_t kLeafHeader_bytes = 8;
 constexpr std::size_t kOverflowLink_bytes = 4;
 constexpr std::size_t kColumns = 4;  // id, topic_id, timestamp, data
 
-std::uint64_t big_endian(View bytes) {
+std::uint64_t big_endian(PageView bytes) {
   std::uint64_t value = 0;
   for (const std::uint8_t byte : bytes) {
     value = value << 8U | byte;
@@ -30,7 +30,7 @@ std::uint64_t big_endian(View bytes) {
 
 /// 1.6: seven bits a byte, high bits first; the ninth byte counts with all its bits. Moves `at`
 /// behind it; nullopt when the bytes end before.
-std::optional<std::uint64_t> take_varint(View bytes, std::size_t& at) {
+std::optional<std::uint64_t> take_varint(PageView bytes, std::size_t& at) {
   std::uint64_t value = 0;
   for (int i = 0; i < 9; ++i) {
     if (at >= bytes.size()) {
@@ -58,7 +58,7 @@ std::optional<std::size_t> integer_size(std::uint64_t serial_type) {
 }
 
 /// 2.1: two's complement, or the constants 0 and 1.
-std::int64_t integer(View bytes, std::uint64_t serial_type) {
+std::int64_t integer(PageView bytes, std::uint64_t serial_type) {
   if (bytes.empty()) {
     return serial_type == 9 ? 1 : 0;
   }
@@ -73,7 +73,7 @@ struct Columns {
 };
 
 /// The columns of a message; nullopt when the record is of another table.
-std::optional<Columns> parse_record(View record, std::uint64_t record_size) {
+std::optional<Columns> parse_record(PageView record, std::uint64_t record_size) {
   std::size_t at = 0;
   const auto header_size = take_varint(record, at);
   std::uint64_t types[kColumns];
@@ -109,7 +109,7 @@ SqliteSalvage::SqliteSalvage(const std::string& file)
     return;
   }
   // 1.3: the value 1 stands for 65536; a part of every page may be reserved.
-  page_size_ = big_endian(View(header).subspan(16, 2));
+  page_size_ = big_endian(PageView(header).subspan(16, 2));
   page_size_ = page_size_ == 1 ? 65536 : page_size_;
   if (page_size_ < 512 || header[20] >= page_size_ / 2) {
     return;
@@ -147,9 +147,9 @@ void SqliteSalvage::scan_page(std::uint64_t number) {
   if (page.empty() || page[0] != kTableLeaf) {
     return;
   }
-  const std::size_t cells = big_endian(View(page).subspan(3, 2));
+  const std::size_t cells = big_endian(PageView(page).subspan(3, 2));
   for (std::size_t i = 0; i < cells && kLeafHeader_bytes + 2 * i + 2 <= page.size(); ++i) {
-    take_cell(page, number, big_endian(View(page).subspan(kLeafHeader_bytes + 2 * i, 2)));
+    take_cell(page, number, big_endian(PageView(page).subspan(kLeafHeader_bytes + 2 * i, 2)));
   }
 }
 
@@ -165,7 +165,7 @@ void SqliteSalvage::take_cell(const std::vector<std::uint8_t>& page,
   if (at + local > page.size()) {
     return;
   }
-  if (const auto columns = parse_record(View(page).subspan(at, local), *record_size)) {
+  if (const auto columns = parse_record(PageView(page).subspan(at, local), *record_size)) {
     rows_.push_back({static_cast<std::int64_t>(*id),
                      columns->topic_id,
                      columns->timestamp_ns,

@@ -16,7 +16,7 @@ namespace {
 constexpr double kStep_m = 0.1;
 constexpr double kMargin_m = 20.0;  ///< straight on before the start and after the end
 constexpr std::ptrdiff_t kMarginSteps = 200;
-constexpr std::size_t kHalfWindow =
+constexpr std::size_t kCurvatureHalfWindow =
     10;  ///< 2.1 m: rounds like a steering wheel, cuts 5 cm of a corner
 
 }  // namespace
@@ -24,7 +24,7 @@ constexpr std::size_t kHalfWindow =
 double radius_before_rounding_m(double radius_m) {
   // The mean of n points on a circle, an angle a apart, is nearer to its centre by
   // sin(n a / 2) / (n sin(a / 2)); the path takes two such means.
-  constexpr auto kPoints = static_cast<double>(2 * kHalfWindow + 1);
+  constexpr auto kPoints = static_cast<double>(2 * kCurvatureHalfWindow + 1);
   double before_m = radius_m;
   for (int i = 0; i < 30; ++i) {
     const double half_angle = 0.5 * kStep_m / before_m;
@@ -71,8 +71,8 @@ void Path::sample(const std::vector<RoutePoint>& route) {
 
 void Path::smooth() {
   for (int pass = 0; pass < 2; ++pass) {
-    points_ = moving_average(points_, kHalfWindow);
-    speeds_mps_ = moving_average(speeds_mps_, kHalfWindow);
+    points_ = moving_average(points_, kCurvatureHalfWindow);
+    speeds_mps_ = moving_average(speeds_mps_, kCurvatureHalfWindow);
   }
 }
 

@@ -9,26 +9,26 @@ namespace trigpoint::simulator {
 
 namespace {
 
-constexpr double kCell_m = 0.1;
+constexpr double kCornerCell_m = 0.1;
 
 /// Speeds at the ends of the cells that no limit of acceleration forbids.
 std::vector<double> reachable_speeds(const Path& path, const MotionConfig& config) {
-  const auto cells = static_cast<std::size_t>(path.length_m() / kCell_m);
+  const auto cells = static_cast<std::size_t>(path.length_m() / kCornerCell_m);
   std::vector<double> v(cells + 1);
   for (std::size_t i = 0; i <= cells; ++i) {
-    const double s_m = static_cast<double>(i) * kCell_m;
+    const double s_m = static_cast<double>(i) * kCornerCell_m;
     const double curvature = std::max(std::abs(path.at(s_m).curvature_radpm), 1e-6);
     v[i] = std::min(path.wanted_speed_mps(s_m),
                     std::sqrt(config.lateral_acceleration_mps2 / curvature));
   }
   for (const Path::Stop& stop : path.stops()) {
-    v[std::min(cells, static_cast<std::size_t>(std::lround(stop.s_m / kCell_m)))] = 0.0;
+    v[std::min(cells, static_cast<std::size_t>(std::lround(stop.s_m / kCornerCell_m)))] = 0.0;
   }
   v[cells] = 0.0;
   if (config.rest_s > 0.0) {
     v[0] = 0.0;
   }
-  const double gain = 2.0 * config.acceleration_mps2 * kCell_m;
+  const double gain = 2.0 * config.acceleration_mps2 * kCornerCell_m;
   for (std::size_t i = 1; i <= cells; ++i) {
     v[i] = std::min(v[i], std::sqrt(v[i - 1] * v[i - 1] + gain));
   }
@@ -40,7 +40,7 @@ std::vector<double> reachable_speeds(const Path& path, const MotionConfig& confi
 
 double dwell_s(const Path& path, std::size_t cell) {
   for (const Path::Stop& stop : path.stops()) {
-    if (static_cast<std::size_t>(std::lround(stop.s_m / kCell_m)) == cell) {
+    if (static_cast<std::size_t>(std::lround(stop.s_m / kCornerCell_m)) == cell) {
       return stop.duration_s;
     }
   }
@@ -53,9 +53,9 @@ SpeedProfile::SpeedProfile(const Path& path, const MotionConfig& config) {
   const std::vector<double> v = reachable_speeds(path, config);
   double t_s = config.rest_s;
   for (std::size_t i = 0; i < v.size(); ++i) {
-    const double s_m = static_cast<double>(i) * kCell_m;
+    const double s_m = static_cast<double>(i) * kCornerCell_m;
     if (i > 0) {
-      t_s += 2.0 * kCell_m / (v[i - 1] + v[i]);
+      t_s += 2.0 * kCornerCell_m / (v[i - 1] + v[i]);
     }
     nodes_.push_back({t_s, s_m, v[i]});
     if (const double dwell = dwell_s(path, i); dwell > 0.0) {

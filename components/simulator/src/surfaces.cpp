@@ -20,7 +20,7 @@ namespace trigpoint::simulator {
 
 namespace {
 
-constexpr double kCell_m = 4.0;
+constexpr double kSurfaceCell_m = 4.0;
 /// A point of a crown or of grass that the estimate or the map's cells moved a little.
 constexpr double kLeavesMargin_m = 0.2;
 /// For the slope of the ground, which is flat over less.
@@ -29,8 +29,8 @@ constexpr double kSlopeStep_m = 0.25;
 using Cell = std::array<std::int32_t, 2>;
 
 Cell cell_of(double east_m, double north_m) {
-  return {static_cast<std::int32_t>(std::floor(east_m / kCell_m)),
-          static_cast<std::int32_t>(std::floor(north_m / kCell_m))};
+  return {static_cast<std::int32_t>(std::floor(east_m / kSurfaceCell_m)),
+          static_cast<std::int32_t>(std::floor(north_m / kSurfaceCell_m))};
 }
 
 World world_of(const Scenario& scenario, std::uint64_t seed) {

@@ -11,7 +11,7 @@
 namespace trigpoint {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
 
 YawMeasurement good_yaw(double yaw_rad = 0.3) {
   return {from_seconds(1.0), "", from_yaw(yaw_rad), 0.01};
@@ -29,8 +29,8 @@ TEST(CheckHeading, refuses_what_is_no_heading_by_name) {
   EXPECT_EQ(reason([](YawMeasurement& y) { y.q_world_base->coeffs().setZero(); }),
             "yaw_without_orientation");
   EXPECT_EQ(reason([](YawMeasurement& y) { y.q_world_base->coeffs() *= 1.2; }), "yaw_not_unit");
-  EXPECT_EQ(reason([](YawMeasurement& y) { y.q_world_base->x() = kNaN; }), "yaw_not_finite");
-  EXPECT_EQ(reason([](YawMeasurement& y) { y.variance_rad2 = kNaN; }), "yaw_not_finite");
+  EXPECT_EQ(reason([](YawMeasurement& y) { y.q_world_base->x() = kNotANumber; }), "yaw_not_finite");
+  EXPECT_EQ(reason([](YawMeasurement& y) { y.variance_rad2 = kNotANumber; }), "yaw_not_finite");
   EXPECT_EQ(reason([](YawMeasurement& y) { y.variance_rad2 = 1e9; }), "yaw_unknown");
   EXPECT_EQ(reason([](YawMeasurement& y) { y.stamp_ns = -5; }), "yaw_stamp_out_of_range");
 }

@@ -16,7 +16,7 @@ using test::kStep_ns;
 using test::straight;
 using test::transformed;
 
-constexpr double kRounding = 1e-9;
+constexpr double kScoreRounding = 1e-9;
 constexpr double kStampRounding = 1e-9;  // s
 
 /// A drive along x at `step_m` a pose whose estimate is off by `error_m(i)` along y.
@@ -42,8 +42,8 @@ TEST(ErrorInside, looks_at_the_windows_only) {
     return i == 5 ? 9.0 : i == 20 ? -3.0 : i == 21 ? 4.0 : 0.0;
   });
   const std::vector<Window> windows{{stamp(19), stamp(22)}, {stamp(30), stamp(33)}};
-  EXPECT_NEAR(*worst_error_m(pairs, windows), 4.0, kRounding);
-  EXPECT_NEAR(*rms_error_m(pairs, windows), std::sqrt(25.0 / 4.0), kRounding);
+  EXPECT_NEAR(*worst_error_m(pairs, windows), 4.0, kScoreRounding);
+  EXPECT_NEAR(*rms_error_m(pairs, windows), std::sqrt(25.0 / 4.0), kScoreRounding);
   EXPECT_FALSE(worst_error_m(pairs, {{0, 1}}));
   EXPECT_FALSE(rms_error_m(pairs, {}));
 }
@@ -76,9 +76,9 @@ TEST(TimeToReturn, does_not_look_beyond_the_hold) {
 TEST(ExcessOverDistance, is_what_the_error_has_more_than_its_share_of_the_way) {
   // From pose 10 on 2 m a pose; error 0.5 m at pose 15: 10 m driven since.
   const auto pairs = pairs_with(40, 2.0, [](int i) { return i == 15 ? -0.5 : i == 3 ? 7.0 : 0.0; });
-  EXPECT_NEAR(*excess_over_distance_m(pairs, stamp(10), 1, 0.003), 0.5 - 0.03, kRounding);
-  EXPECT_NEAR(*excess_over_distance_m(pairs, stamp(10), 2, 0.003), 0.0, kRounding);
-  EXPECT_NEAR(*excess_over_distance_m(pairs, stamp(16), 1, 0.003), 0.0, kRounding);
+  EXPECT_NEAR(*excess_over_distance_m(pairs, stamp(10), 1, 0.003), 0.5 - 0.03, kScoreRounding);
+  EXPECT_NEAR(*excess_over_distance_m(pairs, stamp(10), 2, 0.003), 0.0, kScoreRounding);
+  EXPECT_NEAR(*excess_over_distance_m(pairs, stamp(16), 1, 0.003), 0.0, kScoreRounding);
   EXPECT_FALSE(excess_over_distance_m(pairs, stamp(41), 1, 0.003));
 }
 
@@ -101,8 +101,9 @@ TEST(LargestDifference, leaves_out_the_windows_and_what_the_other_does_not_cover
   other[10].pose.p.z() += 3.0;
   other[12].pose.p.z() -= 0.25;
   other[35].pose.p.z() += 9.0;
-  EXPECT_NEAR(*largest_difference_m(other, reference, {}), 3.0, kRounding);
-  EXPECT_NEAR(*largest_difference_m(other, reference, {{stamp(9), stamp(11)}}), 0.25, kRounding);
+  EXPECT_NEAR(*largest_difference_m(other, reference, {}), 3.0, kScoreRounding);
+  EXPECT_NEAR(
+      *largest_difference_m(other, reference, {{stamp(9), stamp(11)}}), 0.25, kScoreRounding);
   EXPECT_FALSE(largest_difference_m(other, straight(5, 1.0, stamp(100)), {}));
 }
 
@@ -114,12 +115,13 @@ TEST(LargestStepOver, sums_a_correction_that_is_handed_over_slowly) {
   for (int i = 0; i < 100; ++i) {
     fused[static_cast<std::size_t>(i)].pose.p.x() += 0.01 * std::clamp(i - 40, 0, 20);
   }
-  EXPECT_NEAR(largest_step_over(fused, odom, kStep_ns).distance_m, 0.01, kRounding);
-  EXPECT_NEAR(largest_step_over(fused, odom, 5 * kStep_ns).distance_m, 0.05, kRounding);
-  EXPECT_NEAR(largest_step_over(fused, odom, 50 * kStep_ns).distance_m, 0.2, kRounding);
+  EXPECT_NEAR(largest_step_over(fused, odom, kStep_ns).distance_m, 0.01, kScoreRounding);
+  EXPECT_NEAR(largest_step_over(fused, odom, 5 * kStep_ns).distance_m, 0.05, kScoreRounding);
+  EXPECT_NEAR(largest_step_over(fused, odom, 50 * kStep_ns).distance_m, 0.2, kScoreRounding);
   EXPECT_EQ(largest_step_over(fused, odom, 5 * kStep_ns).intervals, 95U);
-  EXPECT_NEAR(
-      largest_step_over(transformed(T_map_odom, odom), odom, kStep_ns).distance_m, 0.0, kRounding);
+  EXPECT_NEAR(largest_step_over(transformed(T_map_odom, odom), odom, kStep_ns).distance_m,
+              0.0,
+              kScoreRounding);
 }
 
 TEST(LargestStepOver, does_not_count_the_length_of_a_gap) {
@@ -129,7 +131,7 @@ TEST(LargestStepOver, does_not_count_the_length_of_a_gap) {
     fused[i].pose.p.y() += 1.0;
   }
   fused.erase(fused.begin() + 25, fused.begin() + 35);
-  EXPECT_NEAR(largest_step_over(fused, odom, kStep_ns).distance_m, 0.0, kRounding);
+  EXPECT_NEAR(largest_step_over(fused, odom, kStep_ns).distance_m, 0.0, kScoreRounding);
 }
 
 TEST(Nees, is_the_squared_error_in_sigmas_per_degree_of_freedom) {

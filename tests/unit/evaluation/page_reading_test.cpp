@@ -26,7 +26,7 @@ using test::make_session;
 using trigpoint::test::read_all;
 using trigpoint::test::ScratchFolder;
 
-std::string page_of(const std::string& session) {
+std::string read_page_of(const std::string& session) {
   ReportOptions only_page;
   only_page.pictures = false;
   return read_all(write_report(session, only_page).page_file);
@@ -117,7 +117,7 @@ class PlotOfPage {
 TEST(ReportPage, draws_sigma_threshold_choices_and_dropouts_where_the_session_has_them) {
   const ScratchFolder folder;
   make_session(folder.path());
-  const std::string page = page_of(folder.path());
+  const std::string page = read_page_of(folder.path());
   constexpr double kPixel_s = 0.01;
   constexpr double kShare = 0.01;
   const std::map<std::string, double> thresholds_m{{"east", 0.5}, {"north", 0.5}, {"up", 1.0}};
@@ -168,7 +168,7 @@ TEST(ReportPage, has_a_dot_for_each_fix_in_the_row_of_its_verdict) {
   for (const FusionStatus& row : rows) {
     gate.append(row);
   }
-  const std::string page = page_of(folder.path());
+  const std::string page = read_page_of(folder.path());
   const PlotOfPage plot(page, "verdicts");
   const auto used = plot.curve("dots used");
   const auto refused = plot.curve("dots refused");
@@ -194,7 +194,7 @@ TEST(ReportPage, draws_what_was_published_east_to_the_right_and_north_up) {
   const ScratchFolder folder;
   make_session(folder.path());
   const auto fused = exporter::read_trajectory(folder.file("fused.tum"));
-  const std::string page = page_of(folder.path());
+  const std::string page = read_page_of(folder.path());
   const auto drawn = PlotOfPage(page, "top-view").curve("line fused");
   ASSERT_FALSE(drawn.empty());
   constexpr double kUnit_m = 0.02;
@@ -249,7 +249,7 @@ TEST(PageScene, holds_the_map_s_points_and_the_trajectories_where_and_when_they_
   const ScratchFolder folder;
   make_session(folder.path());
   exporter::write_pcd(folder.file("map.pcd"), three_points());
-  const std::string page = page_of(folder.path());
+  const std::string page = read_page_of(folder.path());
   const auto scene = nlohmann::json::parse(between(page, "id=\"scene\">", "</script>"));
   const auto steps = values_of<std::uint16_t>(between(page, "id=\"scene-points\">", "</script>"));
   ASSERT_EQ(steps.size(), 9U);
@@ -280,7 +280,7 @@ TEST(PageTopView, has_the_map_s_cells_under_the_places_that_they_are_of) {
   const ScratchFolder folder;
   make_session(folder.path());
   exporter::write_pcd(folder.file("map.pcd"), three_points());
-  const PlotOfPage plot(page_of(folder.path()), "top-view");
+  const PlotOfPage plot(read_page_of(folder.path()), "top-view");
   const std::string image = between(plot.text(), "<image", "/>");
   const auto number = [&](const std::string& name) {
     return std::stod(between(image, " " + name + "=\"", "\""));

@@ -14,7 +14,7 @@ constexpr double kDensity_perm2 = 200.0;
 /// Percentiles of some hundred points, median over some tens of cells, edges of the columns.
 constexpr double kSampling = 0.05;
 /// Coordinates are float32: 4e-6 m at 50 m.
-constexpr double kRounding_m = 2e-5;
+constexpr double kPlaneRounding_m = 2e-5;
 
 /// A wall that begins at `corner_m` and runs `length_m` in the direction of `yaw_rad`.
 struct Wall {
@@ -85,7 +85,7 @@ TEST(FacadeThickness, is_sigma_of_a_wall_with_normal_noise) {
 TEST(FacadeThickness, is_nothing_without_noise) {
   const auto found = facade_thickness(Scene(2).add(Wall{}, 0.0).cloud());
   EXPECT_GT(found.planes, 15U);
-  EXPECT_LT(found.p90_m, kRounding_m);
+  EXPECT_LT(found.p90_m, kPlaneRounding_m);
 }
 
 TEST(FacadeThickness, does_not_depend_on_where_the_cells_borders_lie) {

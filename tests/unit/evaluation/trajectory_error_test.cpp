@@ -15,17 +15,17 @@ using test::helix;
 using test::straight;
 using test::transformed;
 
-constexpr double kRounding = 1e-9;
+constexpr double kErrorRounding = 1e-9;
 constexpr double kDegree_rad = std::numbers::pi / 180.0;
 
 TEST(Statistics, equal_the_closed_forms) {
   const auto s = statistics_of({3.0, -4.0, 0.0, 1.0});
   EXPECT_EQ(s.count, 4U);
-  EXPECT_NEAR(s.rmse, std::sqrt(26.0 / 4.0), kRounding);
-  EXPECT_NEAR(s.mean, 2.0, kRounding);
-  EXPECT_NEAR(s.median, 2.0, kRounding);  // between 1 and 3
-  EXPECT_NEAR(s.max, 4.0, kRounding);
-  EXPECT_NEAR(statistics_of({5.0, 1.0, 2.0}).median, 2.0, kRounding);
+  EXPECT_NEAR(s.rmse, std::sqrt(26.0 / 4.0), kErrorRounding);
+  EXPECT_NEAR(s.mean, 2.0, kErrorRounding);
+  EXPECT_NEAR(s.median, 2.0, kErrorRounding);  // between 1 and 3
+  EXPECT_NEAR(s.max, 4.0, kErrorRounding);
+  EXPECT_NEAR(statistics_of({5.0, 1.0, 2.0}).median, 2.0, kErrorRounding);
 }
 
 TEST(Statistics, of_nothing_are_not_numbers) {
@@ -39,8 +39,8 @@ TEST(Align, yaw_and_translation_are_found_exactly) {
   const auto pairs = associate(estimate, transformed(truth, estimate)).pairs;
   const auto found = align(pairs, AlignmentKind::kYawTranslation);
   ASSERT_TRUE(found);
-  EXPECT_LT((found->p - truth.p).norm(), kRounding);
-  EXPECT_LT(found->q.angularDistance(truth.q), kRounding);
+  EXPECT_LT((found->p - truth.p).norm(), kErrorRounding);
+  EXPECT_LT(found->q.angularDistance(truth.q), kErrorRounding);
 }
 
 TEST(Align, se3_is_found_exactly) {
@@ -118,10 +118,10 @@ TEST(AbsoluteError, of_a_constant_offset_is_that_offset) {
   const auto estimate =
       transformed(Pose(Eigen::Quaterniond::Identity(), {3.0, -4.0, 12.0}), reference);
   const auto error = absolute_error(associate(estimate, reference).pairs);
-  EXPECT_NEAR(error.position_m.rmse, 13.0, kRounding);
-  EXPECT_NEAR(error.horizontal_m.mean, 5.0, kRounding);
-  EXPECT_NEAR(error.axes_m[1].max, 4.0, kRounding);
-  EXPECT_LT((error.bias_m - Eigen::Vector3d(3.0, -4.0, 12.0)).norm(), kRounding);
+  EXPECT_NEAR(error.position_m.rmse, 13.0, kErrorRounding);
+  EXPECT_NEAR(error.horizontal_m.mean, 5.0, kErrorRounding);
+  EXPECT_NEAR(error.axes_m[1].max, 4.0, kErrorRounding);
+  EXPECT_LT((error.bias_m - Eigen::Vector3d(3.0, -4.0, 12.0)).norm(), kErrorRounding);
   EXPECT_NEAR(error.rotation_deg.max, 0.0, 1e-6);
 }
 
@@ -132,8 +132,8 @@ TEST(AbsoluteError, of_a_turn_is_its_angle) {
     pose.pose.q = from_yaw(30.0 * kDegree_rad);
   }
   const auto error = absolute_error(associate(estimate, reference).pairs);
-  EXPECT_NEAR(error.rotation_deg.median, 30.0, kRounding);
-  EXPECT_NEAR(error.position_m.max, 0.0, kRounding);
+  EXPECT_NEAR(error.rotation_deg.median, 30.0, kErrorRounding);
+  EXPECT_NEAR(error.position_m.max, 0.0, kErrorRounding);
 }
 
 TEST(RelativeError, of_an_odometer_that_shows_two_percent_more_is_two_percent) {
@@ -141,8 +141,8 @@ TEST(RelativeError, of_an_odometer_that_shows_two_percent_more_is_two_percent) {
   const auto estimate = straight(201, 1.02);
   const auto error = relative_error(associate(estimate, reference).pairs, 50.0);
   EXPECT_EQ(error.segments, 151U);  // from 0..150 m
-  EXPECT_NEAR(error.translation_percent, 2.0, kRounding);
-  EXPECT_NEAR(error.rotation_deg_per_m, 0.0, kRounding);
+  EXPECT_NEAR(error.translation_percent, 2.0, kErrorRounding);
+  EXPECT_NEAR(error.rotation_deg_per_m, 0.0, kErrorRounding);
 }
 
 TEST(RelativeError, of_a_gyro_drift_is_the_drift_per_metre) {
@@ -152,7 +152,7 @@ TEST(RelativeError, of_a_gyro_drift_is_the_drift_per_metre) {
     estimate[i].pose.q = from_yaw(0.1 * kDegree_rad * static_cast<double>(i));
   }
   const auto error = relative_error(associate(estimate, reference).pairs, 10.0);
-  EXPECT_NEAR(error.rotation_deg_per_m, 0.1, kRounding);
+  EXPECT_NEAR(error.rotation_deg_per_m, 0.1, kErrorRounding);
 }
 
 TEST(RelativeError, does_not_see_where_the_estimate_begins) {
@@ -177,7 +177,7 @@ TEST(RelativePositionError, needs_no_attitude_of_the_reference) {
     pose.pose.q = from_yaw(1.0);  // what a fix does not know
   }
   const auto error = relative_position_error(associate(straight(101, 1.01), reference).pairs, 10.0);
-  EXPECT_NEAR(error.translation_percent, 1.0, kRounding);
+  EXPECT_NEAR(error.translation_percent, 1.0, kErrorRounding);
   EXPECT_TRUE(std::isnan(error.rotation_deg_per_m));
 }
 
@@ -186,10 +186,10 @@ TEST(EndToEnd, tells_error_distance_and_percent) {
   Trajectory estimate = transformed(Pose(from_yaw(1.0), {7.0, 8.0, 9.0}), reference);
   estimate.back().pose = estimate.back().pose * Pose(from_yaw(0.5), {0.0, 2.0, 0.0});
   const auto result = end_to_end(associate(estimate, reference).pairs);
-  EXPECT_NEAR(result.error_m, 2.0, kRounding);
+  EXPECT_NEAR(result.error_m, 2.0, kErrorRounding);
   EXPECT_NEAR(result.error_deg, 0.5 / kDegree_rad, 1e-6);
-  EXPECT_NEAR(result.distance_m, 100.0, kRounding);
-  EXPECT_NEAR(result.percent, 2.0, kRounding);
+  EXPECT_NEAR(result.distance_m, 100.0, kErrorRounding);
+  EXPECT_NEAR(result.percent, 2.0, kErrorRounding);
 }
 
 }  // namespace

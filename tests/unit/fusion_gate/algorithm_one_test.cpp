@@ -10,7 +10,7 @@
 namespace trigpoint::fusion_gate {
 namespace {
 
-const Eigen::Vector3d kThreshold_m{0.5, 0.5, 1.0};
+const Eigen::Vector3d kAcceptance_m{0.5, 0.5, 1.0};
 
 Eigen::Vector3d variances(double sigma_x_m, double sigma_y_m, double sigma_z_m) {
   return Eigen::Vector3d(sigma_x_m, sigma_y_m, sigma_z_m).cwiseAbs2();
@@ -20,9 +20,9 @@ TEST(AlgorithmOne, decides_every_axis_for_itself) {
   for (int combination = 0; combination < 8; ++combination) {
     Eigen::Vector3d sigma_m;
     for (int axis = 0; axis < 3; ++axis) {
-      sigma_m[axis] = kThreshold_m[axis] * ((combination >> axis) & 1 ? 1.01 : 0.99);
+      sigma_m[axis] = kAcceptance_m[axis] * ((combination >> axis) & 1 ? 1.01 : 0.99);
     }
-    const AxisChoices choices = choose_axes(Mode::kHard, sigma_m.cwiseAbs2(), kThreshold_m);
+    const AxisChoices choices = choose_axes(Mode::kHard, sigma_m.cwiseAbs2(), kAcceptance_m);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const bool above = ((combination >> axis) & 1) != 0;
       EXPECT_EQ(choices[axis].decision, above ? AxisDecision::kLio : AxisDecision::kFused)
@@ -52,16 +52,16 @@ TEST(AlgorithmOne, says_why_with_both_numbers) {
 
 TEST(AlgorithmOne, mode_fusion_takes_every_axis_and_mode_lio_none) {
   const Eigen::Vector3d mixed = variances(0.01, 9.0, std::nan(""));
-  for (const AxisChoice& choice : choose_axes(Mode::kFusion, mixed, kThreshold_m)) {
+  for (const AxisChoice& choice : choose_axes(Mode::kFusion, mixed, kAcceptance_m)) {
     EXPECT_EQ(choice.decision, AxisDecision::kFused);
   }
-  EXPECT_FALSE(any_fused(choose_axes(Mode::kLio, variances(0.01, 0.01, 0.01), kThreshold_m)));
+  EXPECT_FALSE(any_fused(choose_axes(Mode::kLio, variances(0.01, 0.01, 0.01), kAcceptance_m)));
 }
 
 TEST(AlgorithmOne, mode_literal_uses_the_same_rule_as_mode_hard) {
   const Eigen::Vector3d mixed = variances(0.4, 0.6, 0.9);
-  const AxisChoices literal = choose_axes(Mode::kLiteral, mixed, kThreshold_m);
-  const AxisChoices hard = choose_axes(Mode::kHard, mixed, kThreshold_m);
+  const AxisChoices literal = choose_axes(Mode::kLiteral, mixed, kAcceptance_m);
+  const AxisChoices hard = choose_axes(Mode::kHard, mixed, kAcceptance_m);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     EXPECT_EQ(literal[axis].decision, hard[axis].decision);
   }

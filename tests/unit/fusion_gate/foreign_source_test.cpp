@@ -17,13 +17,13 @@ namespace {
 
 const Datum kDatum{49.0, 8.0, 100.0, 0};
 const YawPose kTurned{1.2, {-40.0, 25.0, 3.0}};  // T_map_source: it began at its own first fix
-const Eigen::Vector3d kLever_m{0.4, 0.1, 0.9};
-constexpr double kSpeed_mps = 2.0;
+const Eigen::Vector3d kForeignLever_m{0.4, 0.1, 0.9};
+constexpr double kForeignSpeed_mps = 2.0;
 
 Pose T_map_base(double t_s) {
   return {from_yaw(0.3 + 0.05 * t_s),
-          {kSpeed_mps / 0.05 * std::sin(0.3 + 0.05 * t_s),
-           -kSpeed_mps / 0.05 * std::cos(0.3 + 0.05 * t_s),
+          {kForeignSpeed_mps / 0.05 * std::sin(0.3 + 0.05 * t_s),
+           -kForeignSpeed_mps / 0.05 * std::cos(0.3 + 0.05 * t_s),
            0.0}};
 }
 
@@ -34,7 +34,7 @@ Odometry foreign_odometry(double t_s, const std::string& child) {
   odometry.child_frame_id = child;
   odometry.T_frame_child = kTurned.pose().inverse() * T_map_base(t_s);
   if (child == "gnss_antenna") {
-    odometry.T_frame_child.p = odometry.T_frame_child * kLever_m;
+    odometry.T_frame_child.p = odometry.T_frame_child * kForeignLever_m;
   }
   odometry.pose_covariance.topLeftCorner<3, 3>() = Eigen::Matrix3d::Identity() * 1e-3;
   return odometry;
@@ -42,7 +42,7 @@ Odometry foreign_odometry(double t_s, const std::string& child) {
 
 GnssFix fix_at(double t_s) {
   const geodesy::Geographic place =
-      geodesy::LocalFrame(kDatum).to_geographic(T_map_base(t_s) * kLever_m);
+      geodesy::LocalFrame(kDatum).to_geographic(T_map_base(t_s) * kForeignLever_m);
   GnssFix fix;
   fix.stamp_ns = from_seconds(t_s);
   fix.status = FixStatus::kFix;
@@ -63,7 +63,7 @@ struct ForeignDrive {
 /// Fixes of 5 Hz, odometry of 10 Hz whose stamps never meet the fixes', a level LIO as the mapper.
 ForeignDrive drive(const std::string& child, double duration_s, bool fixes = true) {
   RobotConfig robot;
-  robot.antenna_position_base_m = kLever_m;
+  robot.antenna_position_base_m = kForeignLever_m;
   FusionGate gate({}, robot);
   gate.on_datum(kDatum);
   ForeignDrive result;
@@ -94,7 +94,7 @@ TEST(ForeignSource, is_brought_into_map_from_its_own_frame) {
   EXPECT_LT((result.selected->T_frame_child.p - T_map_base(t_s).p).norm(), 0.05);
   ASSERT_GT(result.updates.size(), 20U);
   for (const StateUpdate& update : result.updates) {
-    const Eigen::Vector3d antenna_m = T_map_base(to_seconds(update.fix_stamp_ns)) * kLever_m;
+    const Eigen::Vector3d antenna_m = T_map_base(to_seconds(update.fix_stamp_ns)) * kForeignLever_m;
     EXPECT_LT((update.position_map_m - antenna_m).norm(), 0.05);
   }
   EXPECT_EQ(result.status.gps_source, "ros");
@@ -105,8 +105,9 @@ TEST(ForeignSource, may_speak_of_the_antenna) {
   const ForeignDrive result = drive("gnss_antenna", 30.0);
   ASSERT_FALSE(result.updates.empty());
   const StateUpdate& last = result.updates.back();
-  EXPECT_LT((last.position_map_m - T_map_base(to_seconds(last.fix_stamp_ns)) * kLever_m).norm(),
-            0.05);
+  EXPECT_LT(
+      (last.position_map_m - T_map_base(to_seconds(last.fix_stamp_ns)) * kForeignLever_m).norm(),
+      0.05);
 }
 
 TEST(ForeignSource, gives_nothing_without_raw_fixes) {
@@ -147,7 +148,7 @@ struct StandIn {
 /// `raw`: UTM coordinates themselves instead of those relative to its first fix.
 StandIn drive_stand_in(const Datum& datum, bool raw, unsigned seed) {
   RobotConfig robot;
-  robot.antenna_position_base_m = kLever_m;
+  robot.antenna_position_base_m = kForeignLever_m;
   FusionGate gate({}, robot);
   gate.on_datum(datum);
   const geodesy::LocalFrame frame(datum);
@@ -168,7 +169,7 @@ StandIn drive_stand_in(const Datum& datum, bool raw, unsigned seed) {
     }
     for (const StateUpdate& update : out.state_updates) {
       const Eigen::Vector3d error =
-          update.position_map_m - long_way(to_seconds(update.fix_stamp_ns)) * kLever_m;
+          update.position_map_m - long_way(to_seconds(update.fix_stamp_ns)) * kForeignLever_m;
       result.admitted_s = result.admitted++ == 0 ? t_s : result.admitted_s;
       sum2 += error.squaredNorm();
       result.worst_m = std::max(result.worst_m, error.norm());
@@ -201,7 +202,7 @@ StandIn drive_stand_in(const Datum& datum, bool raw, unsigned seed) {
     keep(gate.on_lio_odometry(lio), t_s);
     if (k % 2 == 0) {
       const geodesy::Geographic place =
-          frame.to_geographic(long_way(t_s + 0.04) * kLever_m + noise(0.02));
+          frame.to_geographic(long_way(t_s + 0.04) * kForeignLever_m + noise(0.02));
       GnssFix fix = fix_at(t_s + 0.04);
       fix.latitude_deg = place.latitude_deg;
       fix.longitude_deg = place.longitude_deg;

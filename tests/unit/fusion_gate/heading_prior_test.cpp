@@ -21,7 +21,7 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr double kDegree_rad = std::numbers::pi / 180.0;
+constexpr double kPriorDegree_rad = std::numbers::pi / 180.0;
 constexpr Nanoseconds kStart_ns = 100 * kNanosecondsPerSecond;
 
 /// A robot that turns on the spot, tilted, and what it hears.
@@ -150,18 +150,20 @@ Heard drive_with_headings(std::optional<double> offset_rad, double sigma_rad) {
 
 TEST(FusionGate, aligns_sooner_with_a_heading_where_fixes_are_coarse) {
   const Heard without = drive_with_headings(std::nullopt, 0.0);
-  const Heard with = drive_with_headings(0.0, 0.5 * kDegree_rad);
+  const Heard with = drive_with_headings(0.0, 0.5 * kPriorDegree_rad);
   ASSERT_TRUE(without.aligned_s && with.aligned_s);
   EXPECT_LT(*with.aligned_s, 0.7 * *without.aligned_s);
-  EXPECT_NEAR(wrap_angle(with.yaw_rad - Scenario{}.T_map_odom.yaw_rad), 0.0, 0.2 * kDegree_rad);
+  EXPECT_NEAR(
+      wrap_angle(with.yaw_rad - Scenario{}.T_map_odom.yaw_rad), 0.0, 0.2 * kPriorDegree_rad);
   EXPECT_EQ(with.contradictions, 0);
 }
 
 TEST(FusionGate, leaves_a_wrong_heading_out_and_says_so_once) {
   const Heard without = drive_with_headings(std::nullopt, 0.0);
-  const Heard wrong = drive_with_headings(40.0 * kDegree_rad, 0.5 * kDegree_rad);
+  const Heard wrong = drive_with_headings(40.0 * kPriorDegree_rad, 0.5 * kPriorDegree_rad);
   ASSERT_TRUE(wrong.aligned_s);
-  EXPECT_NEAR(wrap_angle(wrong.yaw_rad - Scenario{}.T_map_odom.yaw_rad), 0.0, 1.0 * kDegree_rad);
+  EXPECT_NEAR(
+      wrap_angle(wrong.yaw_rad - Scenario{}.T_map_odom.yaw_rad), 0.0, 1.0 * kPriorDegree_rad);
   EXPECT_DOUBLE_EQ(*wrong.aligned_s, *without.aligned_s);
   EXPECT_EQ(wrong.contradictions, 1);
 }

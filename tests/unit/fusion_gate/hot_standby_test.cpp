@@ -14,7 +14,7 @@
 namespace trigpoint::fusion_gate {
 namespace {
 
-constexpr double kHandOver_s = 0.5;  // issue
+constexpr double kStandbyHandOver_s = 0.5;  // issue
 constexpr double kSpeed_mps = 3.0;
 constexpr double kRate_hz = 50.0;
 constexpr double kApart_m = 0.4;  ///< of the two filters' estimates; less than a filter set anew
@@ -78,7 +78,7 @@ TEST_F(TwoFiltersWithoutLio, hands_over_within_half_a_second_and_without_a_step)
     say("b", now_s, kApart_m);
   }
   ASSERT_TRUE(last_);
-  EXPECT_LT(handed_over_s_, kHandOver_s);
+  EXPECT_LT(handed_over_s_, kStandbyHandOver_s);
   EXPECT_LT(worst_step_per_message_m_, kStep_m);
   EXPECT_NEAR(last_->T_frame_child.p.y(), kApart_m, 1e-3) << "the new one is followed in the end";
 }
@@ -95,7 +95,7 @@ TEST_F(TwoFiltersWithoutLio,
       say("b", now_s, kApart_m);
     }
   }
-  EXPECT_LT(handed_over_s_, kHandOver_s);
+  EXPECT_LT(handed_over_s_, kStandbyHandOver_s);
   EXPECT_LT(worst_step_per_message_m_, kStep_m);
 }
 
@@ -109,7 +109,7 @@ TEST_F(TwoFiltersWithoutLio, are_not_led_astray_by_the_last_twist_of_the_one_tha
     }
     say("b", now_s, kApart_m);
   }
-  EXPECT_LT(handed_over_s_, kHandOver_s);
+  EXPECT_LT(handed_over_s_, kStandbyHandOver_s);
   EXPECT_LT(highest_m_, 0.01);
 }
 

@@ -8,7 +8,7 @@
 namespace trigpoint::fusion_gate {
 namespace {
 
-constexpr double kExact = 1e-9;
+constexpr double kExactPlacement = 1e-9;
 
 LioStatus at(double at_s, const YawPose& T_map_odom) {
   LioStatus lio;
@@ -31,8 +31,9 @@ TEST(PlacementHistory, puts_the_robot_where_it_was_put_then) {
   ASSERT_TRUE(alignment);
   EXPECT_TRUE(alignment->replaces);
   EXPECT_EQ(alignment->odom_epoch, 4U);
-  EXPECT_NEAR((alignment->T_map_odom.pose() * kHere - then.pose() * kHere).norm(), 0.0, kExact);
-  EXPECT_NEAR(alignment->T_map_odom.yaw_rad, then.yaw_rad, kExact);
+  EXPECT_NEAR(
+      (alignment->T_map_odom.pose() * kHere - then.pose() * kHere).norm(), 0.0, kExactPlacement);
+  EXPECT_NEAR(alignment->T_map_odom.yaw_rad, then.yaw_rad, kExactPlacement);
 }
 
 TEST(PlacementHistory, changes_nothing_but_the_height_when_only_that_lied) {
@@ -43,8 +44,8 @@ TEST(PlacementHistory, changes_nothing_but_the_height_when_only_that_lied) {
   ASSERT_TRUE(alignment);
   const Eigen::Vector3d placed = alignment->T_map_odom.pose() * kHere;
   const Eigen::Vector3d present = now.T_map_odom.pose() * kHere;
-  EXPECT_NEAR((placed - present).head<2>().norm(), 0.0, kExact);
-  EXPECT_NEAR(placed.z(), 5.0, kExact);
+  EXPECT_NEAR((placed - present).head<2>().norm(), 0.0, kExactPlacement);
+  EXPECT_NEAR(placed.z(), 5.0, kExactPlacement);
 }
 
 TEST(PlacementHistory, knows_nothing_of_before_it_began) {
@@ -60,8 +61,9 @@ TEST(PlacementHistory, carries_the_uncertainty_of_the_place_through_the_alignmen
   point.T_frame_child.p = kHere;
   point.pose_covariance.setZero();
   const Odometry placed = fuse(point, alignment.T_map_odom, alignment.covariance);
-  EXPECT_NEAR((placed.T_frame_child.p - Eigen::Vector3d(5.0, 6.0, 7.0)).norm(), 0.0, kExact);
-  EXPECT_LT((placed.pose_covariance.topLeftCorner<3, 3>() - here_m2).norm(), kExact);
+  EXPECT_NEAR(
+      (placed.T_frame_child.p - Eigen::Vector3d(5.0, 6.0, 7.0)).norm(), 0.0, kExactPlacement);
+  EXPECT_LT((placed.pose_covariance.topLeftCorner<3, 3>() - here_m2).norm(), kExactPlacement);
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 namespace trigpoint::fusion_gate {
 namespace {
 
-AcceptedFix fix_at(double stamp_s, double sigma_m = 0.1) {
+AcceptedFix row_fix_at(double stamp_s, double sigma_m = 0.1) {
   return {from_seconds(stamp_s), {1.0, 2.0, 3.0}, Eigen::Matrix3d::Identity() * sigma_m * sigma_m};
 }
 
@@ -24,7 +24,7 @@ AxisChoices all_fused() {
 TEST(Rows, carry_the_fix_the_lever_arm_and_the_decisions) {
   RowMaker maker({}, kLever_m);
   const StateUpdate update =
-      maker.make(fix_at(10.0), choose_axes(Mode::kHard, {0.01, 4.0, 0.01}, kThreshold_m));
+      maker.make(row_fix_at(10.0), choose_axes(Mode::kHard, {0.01, 4.0, 0.01}, kThreshold_m));
   EXPECT_EQ(update.fix_stamp_ns, from_seconds(10.0));
   EXPECT_EQ(update.position_map_m, Eigen::Vector3d(1.0, 2.0, 3.0));
   EXPECT_EQ(update.lever_arm_base_m, kLever_m);
@@ -37,12 +37,13 @@ TEST(Rows, carry_the_fix_the_lever_arm_and_the_decisions) {
 TEST(Rows, overwrite_in_mode_literal) {
   Config config;
   config.mode = "literal";
-  EXPECT_EQ(RowMaker(config, kLever_m).make(fix_at(1.0), all_fused()).mode, UpdateMode::kOverwrite);
+  EXPECT_EQ(RowMaker(config, kLever_m).make(row_fix_at(1.0), all_fused()).mode,
+            UpdateMode::kOverwrite);
 }
 
 TEST(Rows, are_never_better_than_the_floor) {
   RowMaker maker({}, kLever_m);
-  const StateUpdate update = maker.make(fix_at(1.0, 1e-4), all_fused());
+  const StateUpdate update = maker.make(row_fix_at(1.0, 1e-4), all_fused());
   EXPECT_NEAR(std::sqrt(update.covariance_map_m2(0, 0)), 0.02, 1e-12);
 }
 
@@ -51,15 +52,15 @@ TEST(Rows, grow_with_the_correlation_of_gps_errors_up_to_the_cap) {
   config.gps_correlation_time_s = 5.0;
   config.max_inflation = 60.0;
   RowMaker maker(config, kLever_m);
-  EXPECT_NEAR(maker.make(fix_at(1.0), all_fused()).covariance_map_m2(0, 0), 0.01, 1e-12);
-  EXPECT_NEAR(maker.make(fix_at(1.2), all_fused()).covariance_map_m2(0, 0), 0.01 * 51.0, 1e-9);
-  EXPECT_NEAR(maker.make(fix_at(2.2), all_fused()).covariance_map_m2(0, 0), 0.01 * 11.0, 1e-9);
-  EXPECT_NEAR(maker.make(fix_at(2.25), all_fused()).covariance_map_m2(0, 0), 0.01 * 60.0, 1e-9);
+  EXPECT_NEAR(maker.make(row_fix_at(1.0), all_fused()).covariance_map_m2(0, 0), 0.01, 1e-12);
+  EXPECT_NEAR(maker.make(row_fix_at(1.2), all_fused()).covariance_map_m2(0, 0), 0.01 * 51.0, 1e-9);
+  EXPECT_NEAR(maker.make(row_fix_at(2.2), all_fused()).covariance_map_m2(0, 0), 0.01 * 11.0, 1e-9);
+  EXPECT_NEAR(maker.make(row_fix_at(2.25), all_fused()).covariance_map_m2(0, 0), 0.01 * 60.0, 1e-9);
 }
 
 TEST(Rows, that_enter_no_axis_do_not_count_as_the_last_row) {
   RowMaker maker({}, kLever_m);
-  maker.make(fix_at(1.0), choose_axes(Mode::kHard, {9.0, 9.0, 9.0}, kThreshold_m));
+  maker.make(row_fix_at(1.0), choose_axes(Mode::kHard, {9.0, 9.0, 9.0}, kThreshold_m));
   EXPECT_EQ(maker.inflation(from_seconds(1.2)), 1.0);
 }
 
@@ -85,7 +86,7 @@ TEST(Rows, weigh_together_what_correlated_errors_are_worth) {
   Config config;
   config.gps_correlation_time_s = kTau_s;
   RowMaker maker(config, kLever_m);
-  maker.make(fix_at(0.0), all_fused());
+  maker.make(row_fix_at(0.0), all_fused());
   const double claimed = maker.inflation(from_seconds(kInterval_s)) / kRows;
   EXPECT_NEAR(variance / claimed, 1.0, 0.2);  // 400 runs know a variance to 7 %
 }

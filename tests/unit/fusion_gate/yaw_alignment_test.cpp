@@ -15,7 +15,7 @@ namespace trigpoint::fusion_gate {
 namespace {
 
 constexpr double kDegree_rad = 0.017453292519943295;
-const YawPose kTruth{170.0 * kDegree_rad, {12.0, -7.0, 3.0}};
+const YawPose kTrueAlignment{170.0 * kDegree_rad, {12.0, -7.0, 3.0}};
 
 struct Drive {
   int fixes{40};
@@ -84,16 +84,16 @@ void add_errors(std::vector<AlignmentPair>& pairs, const AlignmentConfig& config
 TEST(YawAlignment, recovers_a_170_degree_yaw_from_noise_free_pairs) {
   Drive drive;
   drive.turn_radps = 0.1;
-  const auto solution = solve_alignment(drive_pairs(drive, kTruth), {});
+  const auto solution = solve_alignment(drive_pairs(drive, kTrueAlignment), {});
   ASSERT_TRUE(solution);
-  EXPECT_NEAR(solution->T_map_odom.yaw_rad, kTruth.yaw_rad, 1e-9);
-  EXPECT_NEAR((solution->T_map_odom.p - kTruth.p).norm(), 0.0, 1e-8);
+  EXPECT_NEAR(solution->T_map_odom.yaw_rad, kTrueAlignment.yaw_rad, 1e-9);
+  EXPECT_NEAR((solution->T_map_odom.p - kTrueAlignment.p).norm(), 0.0, 1e-8);
   EXPECT_EQ(find_obstacle(*solution, {}), std::nullopt);
 }
 
 TEST(YawAlignment, needs_only_a_straight_line_at_any_yaw) {
   for (int degrees = -180; degrees < 180; degrees += 15) {
-    const YawPose truth{degrees * kDegree_rad, kTruth.p};
+    const YawPose truth{degrees * kDegree_rad, kTrueAlignment.p};
     const auto solution = solve_alignment(drive_pairs({}, truth), {});
     ASSERT_TRUE(solution);
     EXPECT_NEAR(wrap_angle(solution->T_map_odom.yaw_rad - truth.yaw_rad), 0.0, 1e-9) << degrees;
@@ -105,7 +105,7 @@ TEST(YawAlignment, is_not_admitted_after_three_metres) {
   Drive drive;
   drive.fixes = 30;
   drive.speed_mps = 0.2;
-  const auto solution = solve_alignment(drive_pairs(drive, kTruth), {});
+  const auto solution = solve_alignment(drive_pairs(drive, kTrueAlignment), {});
   ASSERT_TRUE(solution);
   EXPECT_LT(solution->baseline_m, 3.0);
   EXPECT_THAT(find_obstacle(*solution, {}).value_or(""), testing::HasSubstr("baseline"));
@@ -114,7 +114,7 @@ TEST(YawAlignment, is_not_admitted_after_three_metres) {
 TEST(YawAlignment, says_that_one_pair_does_not_give_a_yaw) {
   Drive drive;
   drive.fixes = 1;
-  const auto solution = solve_alignment(drive_pairs(drive, kTruth), {});
+  const auto solution = solve_alignment(drive_pairs(drive, kTrueAlignment), {});
   ASSERT_TRUE(solution);
   EXPECT_GT(solution->yaw_sigma_rad(), 3.0);
 }
@@ -123,7 +123,7 @@ TEST(YawAlignment, waits_for_a_longer_baseline_when_fixes_are_coarse) {
   Drive drive;
   drive.fixes = 40;
   drive.sigma_m = 1.5;
-  const auto solution = solve_alignment(drive_pairs(drive, kTruth), {});
+  const auto solution = solve_alignment(drive_pairs(drive, kTrueAlignment), {});
   ASSERT_TRUE(solution);
   EXPECT_THAT(find_obstacle(*solution, {}).value_or(""), testing::HasSubstr("yaw sigma"));
 }
@@ -140,7 +140,7 @@ Spread measure_spread(const Drive& drive) {
   const AlignmentConfig config;
   Spread spread;
   for (unsigned seed = 1; seed <= kSeeds; ++seed) {
-    std::vector<AlignmentPair> pairs = drive_pairs(drive, kTruth);
+    std::vector<AlignmentPair> pairs = drive_pairs(drive, kTrueAlignment);
     add_errors(pairs, config, seed);
     for (AlignmentPair& pair : pairs) {
       pair.variance_map_m2 *= drive.claimed_over_true * drive.claimed_over_true;
@@ -150,17 +150,18 @@ Spread measure_spread(const Drive& drive) {
     std::normal_distribution<double> heading_error_rad(0.0, drive.heading_sigma_rad);
     std::optional<YawPrior> heading;
     if (drive.heading_sigma_rad > 0.0) {
-      heading = {wrap_angle(kTruth.yaw_rad + heading_error_rad(generator)),
+      heading = {wrap_angle(kTrueAlignment.yaw_rad + heading_error_rad(generator)),
                  drive.heading_sigma_rad};
     }
     const AlignmentSolution solution = solve_alignment(pairs, config, 0.0, heading).value();
     // LIO's walk is counted back from the newest pair: the truth is the transform that maps the
     // newest pair's drifted position to where it is.
     const Eigen::Vector3d drift_m =
-        pairs.back().p_odom_m - drive_pairs(drive, kTruth).back().p_odom_m;
+        pairs.back().p_odom_m - drive_pairs(drive, kTrueAlignment).back().p_odom_m;
     Eigen::Vector4d error;
-    error[0] = wrap_angle(solution.T_map_odom.yaw_rad - kTruth.yaw_rad);
-    error.tail<3>() = solution.T_map_odom.p - (kTruth.p - from_yaw(kTruth.yaw_rad) * drift_m);
+    error[0] = wrap_angle(solution.T_map_odom.yaw_rad - kTrueAlignment.yaw_rad);
+    error.tail<3>() =
+        solution.T_map_odom.p - (kTrueAlignment.p - from_yaw(kTrueAlignment.yaw_rad) * drift_m);
     spread.yaw_rms_rad += error[0] * error[0] / kSeeds;
     spread.yaw_sigma_rad += solution.covariance(0, 0) / kSeeds;
     spread.nees += error.dot(solution.covariance.ldlt().solve(error)) / kSeeds;
@@ -224,7 +225,7 @@ TEST(YawAlignment, would_be_overconfident_without_the_correlation) {
   Drive drive;
   drive.sigma_m = 1.0;
   drive.fixes = 100;
-  std::vector<AlignmentPair> pairs = drive_pairs(drive, kTruth);
+  std::vector<AlignmentPair> pairs = drive_pairs(drive, kTrueAlignment);
   AlignmentConfig white;
   white.correlated_share = 0.0;
   white.white_share = 1.2;
@@ -236,7 +237,7 @@ TEST(YawAlignment, would_be_overconfident_without_the_correlation) {
 TEST(YawAlignment, is_not_spoiled_by_wild_fixes) {
   Drive drive;
   drive.fixes = 30;
-  std::vector<AlignmentPair> pairs = drive_pairs(drive, kTruth);
+  std::vector<AlignmentPair> pairs = drive_pairs(drive, kTrueAlignment);
   add_errors(pairs, {}, 7);
   const AlignmentSolution clean = solve_alignment(pairs, {}).value();
   pairs[2].p_map_m += Eigen::Vector3d(40.0, -60.0, 20.0);
@@ -249,7 +250,7 @@ TEST(YawAlignment, is_not_spoiled_by_wild_fixes) {
 }
 
 TEST(YawAlignment, refuses_residuals_far_beyond_the_reported_sigmas) {
-  std::vector<AlignmentPair> pairs = drive_pairs({}, kTruth);
+  std::vector<AlignmentPair> pairs = drive_pairs({}, kTrueAlignment);
   for (std::size_t k = 0; k < pairs.size(); ++k) {  // 20 sigma, alternating
     pairs[k].p_map_m.y() += k % 2 == 0 ? 0.4 : -0.4;
   }
@@ -270,7 +271,7 @@ TEST(YawAlignment, gives_the_covariance_of_a_hand_made_case) {
     AlignmentPair pair;
     pair.stamp_ns = from_seconds(k);
     pair.p_odom_m = {2.0 * k, -1.0 * k, 0.0};
-    pair.p_map_m = kTruth.pose() * pair.p_odom_m;
+    pair.p_map_m = kTrueAlignment.pose() * pair.p_odom_m;
     pair.variance_map_m2.setConstant(0.04);
     sum_m2 += pair.p_odom_m.squaredNorm();
     pairs.push_back(pair);
@@ -287,7 +288,7 @@ TEST(YawAlignment, a_tilted_odom_costs_little_height_where_the_robot_is) {
     config.lio_tilt_sigma_rad = modelled_sigma_rad;
     Drive coarse;  // with fine fixes the walk of LIO forgets old pairs, and hides the tilt
     coarse.sigma_m = 0.5;
-    std::vector<AlignmentPair> pairs = drive_pairs(coarse, kTruth);
+    std::vector<AlignmentPair> pairs = drive_pairs(coarse, kTrueAlignment);
     tilt_odom(pairs, {0.02, -0.01, 0.0});
     const AlignmentSolution solution = solve_alignment(pairs, config).value();
     return std::abs(
@@ -301,7 +302,7 @@ TEST(YawAlignment, a_tilted_odom_costs_little_height_where_the_robot_is) {
 /// Pairs of 300 m whose source is a grid with this scale.
 std::vector<AlignmentPair> grid_pairs(double scale) {
   const Drive drive{100, 1.0, 3.0, 0.02};
-  std::vector<AlignmentPair> pairs = drive_pairs(drive, kTruth);
+  std::vector<AlignmentPair> pairs = drive_pairs(drive, kTrueAlignment);
   for (AlignmentPair& pair : pairs) {
     pair.p_odom_m.head<2>() *= scale;
   }
@@ -315,8 +316,8 @@ TEST(YawAlignment, finds_the_scale_of_a_grid_when_asked) {
   const auto solution = solve_alignment(grid_pairs(0.9996), config, 1.0);  // hardly any prior
   ASSERT_TRUE(solution);
   EXPECT_NEAR(solution->scale, 1.0 / 0.9996, 1e-7);
-  EXPECT_NEAR(solution->T_map_odom.yaw_rad, kTruth.yaw_rad, 1e-8);
-  EXPECT_LT((solution->T_map_odom.p - kTruth.p).norm(), 1e-6);
+  EXPECT_NEAR(solution->T_map_odom.yaw_rad, kTrueAlignment.yaw_rad, 1e-8);
+  EXPECT_LT((solution->T_map_odom.p - kTrueAlignment.p).norm(), 1e-6);
 }
 
 TEST(YawAlignment, leaves_the_scale_at_one_when_not_asked) {
@@ -345,7 +346,7 @@ TEST(YawAlignment, predicts_the_error_of_the_scale_with_correlated_errors) {
 
 TEST(YawAlignment, returns_nothing_without_pairs_or_with_nan) {
   EXPECT_FALSE(solve_alignment({}, {}));
-  std::vector<AlignmentPair> pairs = drive_pairs({}, kTruth);
+  std::vector<AlignmentPair> pairs = drive_pairs({}, kTrueAlignment);
   pairs[3].p_map_m.x() = std::nan("");
   EXPECT_FALSE(solve_alignment(pairs, {}));
 }

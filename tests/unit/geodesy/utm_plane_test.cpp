@@ -15,11 +15,11 @@
 namespace trigpoint::geodesy {
 namespace {
 
-constexpr double kMillimetre = 1e-3;
+constexpr double kPlaneMillimetre = 1e-3;
 constexpr double kKilometre_m = 1000.0;
 constexpr double kUtmEnd_deg = 84.0;
 
-Datum datum_at(const Geographic& place) {
+Datum plane_datum_at(const Geographic& place) {
   return {place.latitude_deg, place.longitude_deg, place.height_m, 0};
 }
 
@@ -39,8 +39,8 @@ Geographic at(const Geographic& origin, double distance_m, double azimuth_deg, d
 class UtmPlaces : public testing::TestWithParam<Geographic> {
  protected:
   double worst_m(double distance_m) const {
-    const LocalFrame enu(datum_at(GetParam()));
-    const LocalFrame utm(datum_at(GetParam()), Projection::kUtm);
+    const LocalFrame enu(plane_datum_at(GetParam()));
+    const LocalFrame utm(plane_datum_at(GetParam()), Projection::kUtm);
     double worst = 0.0;
     for (int i = 0; i < 16; ++i) {
       const Geographic place = at(GetParam(), distance_m, 22.5 * i, 5.0 * i - 40.0);
@@ -56,35 +56,35 @@ class UtmPlaces : public testing::TestWithParam<Geographic> {
 };
 
 TEST_P(UtmPlaces, give_the_same_map_within_a_millimetre_at_a_kilometre) {
-  EXPECT_LT(worst_m(kKilometre_m), kMillimetre);
-  EXPECT_LT(worst_m(100.0), kMillimetre);
+  EXPECT_LT(worst_m(kKilometre_m), kPlaneMillimetre);
+  EXPECT_LT(worst_m(100.0), kPlaneMillimetre);
 }
 
 TEST_P(UtmPlaces, give_the_same_map_within_a_millimetre_at_ten_kilometres) {
-  EXPECT_LT(worst_m(10.0 * kKilometre_m), kMillimetre);
+  EXPECT_LT(worst_m(10.0 * kKilometre_m), kPlaneMillimetre);
 }
 
 TEST_P(UtmPlaces, keep_distance_and_azimuth_of_the_geodesic) {
   Geographic origin = GetParam();
   origin.height_m = 0.0;
-  const LocalFrame frame(datum_at(origin), Projection::kUtm);
+  const LocalFrame frame(plane_datum_at(origin), Projection::kUtm);
   for (const double azimuth_deg : {10.0, 100.0, 190.0, 280.0}) {
     const auto p = frame.to_map(at(origin, kKilometre_m, azimuth_deg, 0.0));
     ASSERT_TRUE(p.has_value());
     // The chord of an arc of a kilometre is 1 micrometre shorter.
-    EXPECT_NEAR(p->norm(), kKilometre_m, kMillimetre);
+    EXPECT_NEAR(p->norm(), kKilometre_m, kPlaneMillimetre);
     const double azimuth = azimuth_deg * std::numbers::pi / 180.0;
     const double across = p->x() * std::cos(azimuth) - p->y() * std::sin(azimuth);
-    EXPECT_NEAR(across, 0.0, kMillimetre);
+    EXPECT_NEAR(across, 0.0, kPlaneMillimetre);
   }
 }
 
 TEST_P(UtmPlaces, come_back_to_the_same_place) {
-  const LocalFrame frame(datum_at(GetParam()), Projection::kUtm);
+  const LocalFrame frame(plane_datum_at(GetParam()), Projection::kUtm);
   const Eigen::Vector3d position(412.5, -873.25, 12.75);
   const auto back = frame.to_map(frame.to_geographic(position));
   ASSERT_TRUE(back.has_value());
-  EXPECT_LT((*back - position).norm(), kMillimetre);
+  EXPECT_LT((*back - position).norm(), kPlaneMillimetre);
 }
 
 INSTANTIATE_TEST_SUITE_P(Earth,
@@ -104,7 +104,7 @@ INSTANTIATE_TEST_SUITE_P(Earth,
 TEST(UtmPlane, takes_out_more_than_half_a_metre_a_kilometre) {
   // Denver, height 1600 m: what the printed (6)-(7) leave is 0.6 m a kilometre.
   const Geographic origin{39.74, -104.99, 1600.0};
-  const UtmZone zone = utm_zone_of(datum_at(origin));
+  const UtmZone zone = utm_zone_of(plane_datum_at(origin));
   const Geographic place = at(origin, kKilometre_m, 90.0, 0.0);
   const auto from = to_utm(origin, zone);
   const auto to = to_utm(place, zone);
@@ -112,7 +112,7 @@ TEST(UtmPlane, takes_out_more_than_half_a_metre_a_kilometre) {
   const double grid_m =
       std::hypot(to->easting_m - from->easting_m, to->northing_m - from->northing_m);
   const double map_m =
-      LocalFrame(datum_at(origin), Projection::kUtm).to_map(place).value().head<2>().norm();
+      LocalFrame(plane_datum_at(origin), Projection::kUtm).to_map(place).value().head<2>().norm();
   EXPECT_GT(map_m - grid_m, 0.5);
 }
 

@@ -9,12 +9,12 @@
 namespace trigpoint::gps_odometry {
 namespace {
 
-constexpr int kRuns = 8;
+constexpr int kStatisticsRuns = 8;
 
 TEST(Eskf18Statistics, outages_stay_small_and_within_sigma) {
   for (const double speed : {1.5, 5.0}) {
     double inside = 0.0;
-    const auto figures = measure_outage(speed, kRuns, config_with_datum("eskf18"));
+    const auto figures = measure_outage(speed, kStatisticsRuns, config_with_datum("eskf18"));
     for (const OutageFigure& figure : figures) {
       inside += figure.inside / static_cast<double>(figures.size());
     }
@@ -25,13 +25,13 @@ TEST(Eskf18Statistics, outages_stay_small_and_within_sigma) {
 
 TEST(Eskf18Statistics, raw_covariance_is_neither_half_nor_double_the_error) {
   // 24 degrees of freedom an epoch: mean 1, 99.9 % of single epochs within [0.3, 2.3].
-  const auto anees = measure_raw_anees(kRuns);
+  const auto anees = measure_raw_anees(kStatisticsRuns);
   EXPECT_GT(*std::min_element(anees.begin(), anees.end()), 0.3);
   EXPECT_LT(*std::max_element(anees.begin(), anees.end()), 2.3);
 }
 
 TEST(Eskf18Statistics, town_errors_are_within_the_published_sigma) {
-  const UrbanFigure figure = measure_urban(kRuns, 240.0);
+  const UrbanFigure figure = measure_urban(kStatisticsRuns, 240.0);
   EXPECT_LE(figure.anees, 2.0);
   EXPECT_GE(figure.inside, 0.95);
 }

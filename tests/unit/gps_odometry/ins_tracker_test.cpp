@@ -17,15 +17,15 @@
 namespace trigpoint::gps_odometry {
 namespace {
 
-constexpr double kSettled_s = 15.0;
+constexpr double kTrackerSettled_s = 15.0;
 constexpr double kInsTolerance_m = 0.03;  // rms, 3-D
 constexpr double kMetresPerDegree = 111'200.0;
 const char* const kIns = "eskf18";
 
-Recorded drive_and_run(const Profile& profile,
-                       double duration_s,
-                       const Sensors& sensors,
-                       unsigned seed) {
+Recorded drive_and_track(const Profile& profile,
+                         double duration_s,
+                         const Sensors& sensors,
+                         unsigned seed) {
   const auto truth = drive(profile, duration_s);
   GpsOdometry filter(config_with_datum(kIns), sensors.robot);
   return run(filter, sense(truth, sensors, seed), truth);
@@ -52,8 +52,8 @@ TEST(InsTracker, drives_with_rtk_latency_and_lever_arm_within_three_centimetres)
   for (const double speed : {1.5, 5.0}) {
     Pooled pooled;
     for (unsigned seed = 1; seed <= 5; ++seed) {
-      const Recorded result = drive_and_run(town(speed, 3.0), 90.0, cheap_robot(seed), seed);
-      pooled.add(rms_m(result.samples, kSettled_s));
+      const Recorded result = drive_and_track(town(speed, 3.0), 90.0, cheap_robot(seed), seed);
+      pooled.add(rms_m(result.samples, kTrackerSettled_s));
       EXPECT_EQ(result.statuses.back().health, GpsHealth::kOk);
     }
     std::printf("rtk %.1f m/s: rms %.4f m\n", speed, pooled.rms());
@@ -65,9 +65,9 @@ TEST(InsTracker, drives_a_circle_on_two_fixes_a_second_within_five_centimetres) 
   for (unsigned seed = 1; seed <= 5; ++seed) {
     Sensors sensors = cheap_robot(seed);
     sensors.fix_hz = 2.0;
-    const Recorded result = drive_and_run(circle(2.0, 0.5, 3.0), 75.0, sensors, seed);
-    std::printf("circle seed %u: rms %.4f m\n", seed, rms_m(result.samples, kSettled_s));
-    EXPECT_LT(rms_m(result.samples, kSettled_s), 0.05);
+    const Recorded result = drive_and_track(circle(2.0, 0.5, 3.0), 75.0, sensors, seed);
+    std::printf("circle seed %u: rms %.4f m\n", seed, rms_m(result.samples, kTrackerSettled_s));
+    EXPECT_LT(rms_m(result.samples, kTrackerSettled_s), 0.05);
     double lateral_mps = 0.0;
     for (auto odometry = result.odometry.end() - 1500; odometry != result.odometry.end();
          ++odometry) {
@@ -80,12 +80,12 @@ TEST(InsTracker, drives_a_circle_on_two_fixes_a_second_within_five_centimetres) 
 TEST(InsTracker, works_with_an_imu_that_is_mounted_turned) {
   Sensors sensors = cheap_robot(1);
   sensors.robot.imu_roll_pitch_yaw_base_rad = {M_PI, 0.0, M_PI / 2.0};
-  EXPECT_LT(rms_m(drive_and_run(town(1.5, 3.0), 60.0, sensors, 1).samples, kSettled_s),
+  EXPECT_LT(rms_m(drive_and_track(town(1.5, 3.0), 60.0, sensors, 1).samples, kTrackerSettled_s),
             kInsTolerance_m);
 }
 
 TEST(InsTracker, publishes_monotone_stamps_and_positive_covariances) {
-  const Recorded result = drive_and_run(town(1.5, 3.0), 40.0, cheap_robot(1), 1);
+  const Recorded result = drive_and_track(town(1.5, 3.0), 40.0, cheap_robot(1), 1);
   Nanoseconds last_ns = 0;
   for (const Odometry& odometry : result.odometry) {
     EXPECT_GT(odometry.stamp_ns, last_ns);
@@ -103,7 +103,7 @@ TEST(InsTracker, publishes_monotone_stamps_and_positive_covariances) {
 TEST(InsTracker, finds_its_heading_when_it_starts_in_motion) {
   Pooled pooled;
   for (unsigned seed = 1; seed <= 5; ++seed) {
-    const Recorded result = drive_and_run(town(5.0, -10.0), 60.0, cheap_robot(seed), seed);
+    const Recorded result = drive_and_track(town(5.0, -10.0), 60.0, cheap_robot(seed), seed);
     pooled.add(rms_m(result.samples, 25.0));
     EXPECT_LT(std::abs(result.samples.back().yaw_error_rad), 0.05);
   }
@@ -113,7 +113,7 @@ TEST(InsTracker, finds_its_heading_when_it_starts_in_motion) {
 TEST(InsTracker, knows_after_a_rest_that_it_starts_in_reverse) {
   Pooled pooled;
   for (unsigned seed = 1; seed <= 5; ++seed) {
-    const Recorded result = drive_and_run(reverse_start(1.5, 4.0), 60.0, cheap_robot(seed), seed);
+    const Recorded result = drive_and_track(reverse_start(1.5, 4.0), 60.0, cheap_robot(seed), seed);
     for (const Sample& sample : result.samples) {
       if (sample.yaw_sigma_rad < 1.0) {
         EXPECT_LT(std::abs(sample.yaw_error_rad), 4.0 * sample.yaw_sigma_rad) << sample.time_s;
@@ -136,7 +136,7 @@ Profile backwards() {
 TEST(InsTracker, turns_its_heading_round_when_it_was_in_reverse_without_a_rest_before) {
   Pooled pooled;
   for (unsigned seed = 1; seed <= 5; ++seed) {
-    const Recorded result = drive_and_run(backwards(), 60.0, cheap_robot(seed), seed);
+    const Recorded result = drive_and_track(backwards(), 60.0, cheap_robot(seed), seed);
     EXPECT_LT(std::abs(result.samples.back().yaw_error_rad), 0.1);
     EXPECT_EQ(result.statuses.back().health, GpsHealth::kOk);
     pooled.add(rms_m(result.samples, 30.0));

@@ -17,8 +17,8 @@ namespace trigpoint::gps_odometry {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kNumericalStep = 1e-6;
-constexpr double kJacobianTolerance = 1e-7;  // central differences of values up to some tens
+constexpr double kStrictNumericalStep = 1e-6;
+constexpr double kStrictJacobianTolerance = 1e-7;  // central differences of values up to some tens
 constexpr double kRoundOff = 1e-12;
 
 MooreStouch started() {
@@ -35,7 +35,7 @@ StrictOutcome measure(MooreStouch& filter, int state, double value, double varia
   return filter.correct(z, R, states({state}));
 }
 
-Vector15d random_state(std::mt19937_64& random) {
+Vector15d random_strict_state(std::mt19937_64& random) {
   std::uniform_real_distribution<double> one(-1.0, 1.0);
   Vector15d x;
   for (double& value : x) {
@@ -53,17 +53,17 @@ TEST(Ekf15Strict, has_the_jacobian_of_its_motion_model) {
   std::mt19937_64 random(1);
   double worst = 0.0;
   for (int n = 0; n < 500; ++n) {
-    const Vector15d x = random_state(random);
+    const Vector15d x = random_strict_state(random);
     const double dt_s = 0.001 + 0.0005 * n;
     Matrix15d numerical;
     for (int i = 0; i < 15; ++i) {
-      const Vector15d step = kNumericalStep * Vector15d::Unit(i);
+      const Vector15d step = kStrictNumericalStep * Vector15d::Unit(i);
       numerical.col(i) = (moore_stouch_model(x + step, dt_s) - moore_stouch_model(x - step, dt_s)) /
-                         (2.0 * kNumericalStep);
+                         (2.0 * kStrictNumericalStep);
     }
     worst = std::max(worst, (moore_stouch_jacobian(x, dt_s) - numerical).cwiseAbs().maxCoeff());
   }
-  EXPECT_LT(worst, kJacobianTolerance);
+  EXPECT_LT(worst, kStrictJacobianTolerance);
   std::printf("500 random states: analytic and numerical Jacobian differ by %.1e at most\n", worst);
 }
 

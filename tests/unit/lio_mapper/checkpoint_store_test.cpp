@@ -31,7 +31,7 @@ class CheckpointStore : public ::testing::Test {
   std::filesystem::path folder_;
 };
 
-Keyframe keyframe(int i) {
+Keyframe small_keyframe(int i) {
   Keyframe k;
   k.id = static_cast<std::uint64_t>(i);
   k.stamp_ns = 1'000 + i;
@@ -86,7 +86,7 @@ TEST_F(CheckpointStore, gives_back_the_newest_checkpoint_and_every_row) {
   const Checkpoint c = checkpoint(2);
   {
     KeyframeWriter writer(file());
-    writer.commit(checkpoint(1), {row(1)}, keyframe(1));
+    writer.commit(checkpoint(1), {row(1)}, small_keyframe(1));
     writer.commit(c, {row(2), row(3)}, std::nullopt);
   }
   KeyframeReader reader(file());
@@ -132,7 +132,7 @@ TEST_F(CheckpointStore, finds_the_keyframes_of_a_place) {
     KeyframeWriter writer(file());
     int stamp = 0;
     for (const int x : {0, 5, 50, 6, 7}) {
-      Keyframe k = keyframe(x);
+      Keyframe k = small_keyframe(x);
       k.stamp_ns = ++stamp;
       writer.append(k);
     }
@@ -151,7 +151,7 @@ TEST_F(CheckpointStore, finds_the_keyframes_of_a_place) {
 TEST_F(CheckpointStore, tells_a_cloud_in_which_one_byte_changed) {
   {
     KeyframeWriter writer(file());
-    writer.append(keyframe(1));
+    writer.append(small_keyframe(1));
   }
   sqlite3* database = nullptr;
   ASSERT_EQ(sqlite3_open(file().c_str(), &database), SQLITE_OK);
@@ -175,7 +175,7 @@ TEST_F(CheckpointStore, keeps_scans_whole_when_the_writer_is_killed) {
     if (child == 0) {
       KeyframeWriter writer(killed);
       for (int i = 0;; ++i) {
-        writer.commit(checkpoint(i), {row(i)}, keyframe(i));
+        writer.commit(checkpoint(i), {row(i)}, small_keyframe(i));
         if (::write(pipe[1], &i, sizeof i) != sizeof i) {
           _exit(1);
         }

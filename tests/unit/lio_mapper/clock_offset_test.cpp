@@ -16,7 +16,7 @@ namespace {
 constexpr double kScan_s = 0.1;
 constexpr double kImu_s = 0.005;
 constexpr double kAttitudeNoise_rad = 3e-4;
-constexpr Nanoseconds kEpoch_ns = 1'000'000'000'000;
+constexpr Nanoseconds kClockEpoch_ns = 1'000'000'000'000;
 
 /// A robot that turns to and fro and nods; `turns` false: it stands.
 Eigen::Quaterniond attitude(double t, bool turns) {
@@ -44,14 +44,14 @@ std::optional<ClockOffset> estimate_after(double duration_s,
       const double h = 1e-5;
       const Eigen::Vector3d rate =
           so3_log(attitude(t - h, turns).conjugate() * attitude(t + h, turns)) / (2.0 * h);
-      imu.push({kEpoch_ns + from_seconds(t), rate + bias, Eigen::Vector3d::Zero()});
+      imu.push({kClockEpoch_ns + from_seconds(t), rate + bias, Eigen::Vector3d::Zero()});
     }
     const Eigen::Vector3d noise{normal(random), normal(random), normal(random)};
-    estimator.add(kEpoch_ns + from_seconds(now_s),
+    estimator.add(kClockEpoch_ns + from_seconds(now_s),
                   attitude(now_s + offset_s, turns) * so3_exp(kAttitudeNoise_rad * noise),
                   Eigen::Vector3d::Zero(),
                   imu);
-    imu.forget_before(kEpoch_ns + from_seconds(now_s));
+    imu.forget_before(kClockEpoch_ns + from_seconds(now_s));
   }
   return estimator.estimate();
 }

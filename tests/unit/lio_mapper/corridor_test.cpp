@@ -22,8 +22,8 @@ namespace {
 
 using testing_support::RoomDrive;
 
-constexpr Nanoseconds kSweep_ns = 100'000'000;
-constexpr Nanoseconds kImuPeriod_ns = 5'000'000;
+constexpr Nanoseconds kTurn_ns = 100'000'000;
+constexpr Nanoseconds kImuStep_ns = 5'000'000;
 
 /// Rests, then drives straight through a corridor 2 m wide and 3 m high without ends or doors.
 class CorridorDrive final : public RoomDrive {
@@ -75,7 +75,7 @@ Along driven(unsigned seed, int seconds) {
   Eigen::Vector3d accel_sum = Eigen::Vector3d::Zero();
   constexpr int kAtRest = 400;
   for (int i = 0; i <= seconds * 200 + 40; ++i) {
-    ImuSample sample = drive.imu_at(RoomDrive::kEpoch_ns + i * kImuPeriod_ns);
+    ImuSample sample = drive.imu_at(RoomDrive::kEpoch_ns + i * kImuStep_ns);
     for (int axis = 0; axis < 3; ++axis) {
       sample.gyro_radps[axis] += 4e-3 * normal(random);
       sample.accel_mps2[axis] += 0.06 * normal(random);
@@ -90,7 +90,7 @@ Along driven(unsigned seed, int seconds) {
   for (int i = 0; i < seconds * 10; ++i) {
     Events events;
     const auto decoded =
-        decoder.decode(drive.sweep_at(RoomDrive::kEpoch_ns + i * kSweep_ns), events);
+        decoder.decode(drive.sweep_at(RoomDrive::kEpoch_ns + i * kTurn_ns), events);
     filter.insert(filter.process(std::get<Sweep>(decoded), imu));
   }
   const double truth_m = drive.pose_at(seconds).p.x();

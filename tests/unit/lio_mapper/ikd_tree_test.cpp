@@ -36,10 +36,10 @@ bool same_places(const PointCloud& a, const PointCloud& b) {
 }
 
 /// A cube of points, or a street-like slab when `flat`.
-PointCloud random_points(std::size_t count,
-                         std::mt19937& random,
-                         float half_m = 20.0F,
-                         bool flat = false) {
+PointCloud random_tree_points(std::size_t count,
+                              std::mt19937& random,
+                              float half_m = 20.0F,
+                              bool flat = false) {
   std::uniform_real_distribution<float> place(-half_m, half_m);
   std::uniform_real_distribution<float> height(-0.1F, 0.1F);
   PointCloud points;
@@ -123,7 +123,7 @@ TEST_P(RandomOperations, leave_the_nearest_neighbours_equal_to_brute_force) {
     if (what < 6) {
       // Some land in a corner, so that the tree leans.
       PointCloud more =
-          random_points(static_cast<std::size_t>(pick(400)), random, 20.0F, pick(2) == 0);
+          random_tree_points(static_cast<std::size_t>(pick(400)), random, 20.0F, pick(2) == 0);
       if (pick(2) == 0) {
         for (PointXyzi& p : more) {
           p = {0.05F * p.x + static_cast<float>(step), 0.05F * p.y, p.z, p.intensity};
@@ -132,7 +132,7 @@ TEST_P(RandomOperations, leave_the_nearest_neighbours_equal_to_brute_force) {
       tree.insert(more);
       held.insert(held.end(), more.begin(), more.end());
     } else {
-      const Vector3f corner = random_points(1, random)[0].position();
+      const Vector3f corner = random_tree_points(1, random)[0].position();
       const float side = 0.5F * static_cast<float>(1 + pick(60));
       const Box box(corner, Vector3f(corner + Vector3f::Constant(side)));
       const bool inside = what < 9;
@@ -208,7 +208,7 @@ TEST_P(RandomOperations, thinned_insertion_keeps_the_centremost_point_of_each_vo
   IkdTree tree({.unbalanced_share = 0.65, .deleted_share = 0.5, .rebuilt_aside = 200});
   ThinnedByHand expected(0.5F);
   for (int scan = 0; scan < 15; ++scan) {
-    PointCloud points = random_points(1500, random, 6.0F, scan % 3 != 0);
+    PointCloud points = random_tree_points(1500, random, 6.0F, scan % 3 != 0);
     for (PointXyzi& p : points) {
       p.x += static_cast<float>(scan);
     }
@@ -230,7 +230,7 @@ TEST(IkdTree, stays_balanced_while_a_drive_goes_one_way) {
   std::mt19937 random(5);
   IkdTree tree;
   for (int scan = 0; scan < 200; ++scan) {
-    PointCloud points = random_points(500, random, 10.0F, true);
+    PointCloud points = random_tree_points(500, random, 10.0F, true);
     for (PointXyzi& p : points) {
       p.x += 2.0F * static_cast<float>(scan);
     }
@@ -258,7 +258,7 @@ TEST(IkdTree, answers_several_threads_at_once_while_a_rebuild_is_under_way) {
   IkdTree tree({.unbalanced_share = 0.65, .deleted_share = 0.5, .rebuilt_aside = 100});
   PointCloud held;
   for (int scan = 0; scan < 20; ++scan) {
-    PointCloud points = random_points(800, random, 5.0F);
+    PointCloud points = random_tree_points(800, random, 5.0F);
     for (PointXyzi& p : points) {
       p.x += static_cast<float>(scan);
     }

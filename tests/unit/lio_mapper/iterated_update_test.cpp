@@ -178,7 +178,7 @@ class RoomMap final : public UnchangingMap {
 };
 
 /// One thread; that more change nothing has a test of its own.
-Workers workers(1);
+Workers one_worker(1);
 
 /// The cone of a ring in foliage: beams that run along the plane at 1 degree against beams that hit
 /// a wall at 60 degrees.
@@ -192,7 +192,7 @@ TEST(ScanMatcher, believes_little_of_a_plane_that_its_beams_run_along) {
     MatchingConfig config;
     config.grazing_cos = grazing_cos;
     const Pose T_base_lidar{Eigen::Quaterniond::Identity(), {0.0, 0.0, -1.9}};
-    ScanMatcher matcher(points, map, T_base_lidar, config, workers);
+    ScanMatcher matcher(points, map, T_base_lidar, config, one_worker);
     return matcher.linearise(Pose{}).information(2, 2);
   };
   const double by_default = MatchingConfig{}.grazing_cos;
@@ -216,7 +216,7 @@ TEST(ScanMatcher, gradient_and_information_are_the_derivatives_of_the_cost) {
   config.range_sigma_m = 0.02;
   config.angle_sigma_rad = 0.0;
   const Pose T{so3_exp({0.01, -0.02, 0.015}), {0.02, -0.03, 0.01}};
-  ScanMatcher matcher(points, map, Pose{}, config, workers);
+  ScanMatcher matcher(points, map, Pose{}, config, one_worker);
   const PoseInformation info = matcher.linearise(T);
   EXPECT_EQ(info.count, points.size());
 
@@ -276,7 +276,7 @@ TEST(ScanMatcher, gradient_with_extrinsic_is_the_derivative_of_the_cost) {
     const Eigen::Vector3f p = (T * point.position().cast<double>()).cast<float>();
     origins.insert({{p.x(), p.y(), p.z(), 0.0F}}, T_then, T_base_lidar_then);
   }
-  ScanMatcher matcher(points, map, T_base_lidar, config, workers);
+  ScanMatcher matcher(points, map, T_base_lidar, config, one_worker);
   matcher.linearise(T, T_base_lidar, origins);
   const Pose T_base_lidar_now{T_base_lidar.q * so3_exp({0.01, 0.02, -0.015}),
                               T_base_lidar.p + Eigen::Vector3d(0.02, 0.01, -0.03)};
@@ -322,7 +322,7 @@ TEST(ScanMatcher, does_not_see_the_extrinsic_from_where_the_map_was_made) {
   MapOrigins origins;
   origins.insert(points, {}, T_base_lidar);
   const MatchingConfig config;
-  ScanMatcher matcher(points, map, T_base_lidar, config, workers);
+  ScanMatcher matcher(points, map, T_base_lidar, config, one_worker);
   const auto share = [&](const Pose& T) {
     const auto A = matcher.linearise(T, T_base_lidar, origins).information;
     const double extrinsic = A.bottomRightCorner<6, 6>().norm();
@@ -339,7 +339,7 @@ TEST(ScanMatcher, residuals_of_one_patch_weigh_as_one) {
     PointCloud points(here, PointXyzi{10.0F, 1.0F, 0.0F, 0.0F});
     const auto side = static_cast<float>(config.patch_m);
     points.resize(here + elsewhere, PointXyzi{10.0F, 1.0F - side, 0.0F, 0.0F});
-    ScanMatcher matcher(points, map, Pose{}, config, workers);
+    ScanMatcher matcher(points, map, Pose{}, config, one_worker);
     return matcher.linearise({}).information(0, 0);
   };
   EXPECT_NEAR(information_of(900, 0) / information_of(1, 0), 1.0, 1e-5);
@@ -353,7 +353,7 @@ TEST(ScanMatcher, more_patches_than_the_most_weigh_as_the_most) {
     config.max_patches = max_patches;
     const auto side = static_cast<float>(config.patch_m);
     const PointCloud points{{10.0F, 1.0F, 0.0F, 0.0F}, {10.0F, 1.0F - side, 0.0F, 0.0F}};
-    ScanMatcher matcher(points, map, Pose{}, config, workers);
+    ScanMatcher matcher(points, map, Pose{}, config, one_worker);
     return matcher.linearise({}).information(0, 0);
   };
   EXPECT_NEAR(information_of(2) / information_of(1), 2.0, 1e-9);
@@ -370,7 +370,7 @@ TEST(ScanMatcher, sums_to_the_same_bits_on_any_number_of_threads) {
   const RoomMap map;
   const MatchingConfig config;
   const Pose T{so3_exp({0.01, -0.02, 0.015}), {0.02, -0.03, 0.01}};
-  ScanMatcher alone(points, map, Pose{}, config, workers);
+  ScanMatcher alone(points, map, Pose{}, config, one_worker);
   const PoseInformation expected = alone.linearise(T);
   ASSERT_GT(expected.count, 1000U);
   for (const std::size_t threads : {2U, 3U, 7U}) {

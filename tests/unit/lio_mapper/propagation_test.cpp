@@ -16,8 +16,8 @@ namespace {
 using testing_support::random_covariance;
 using testing_support::random_state;
 
-const InertialStep kStep{{0, {0.4, -0.7, 1.1}, {1.0, -2.0, 9.0}},
-                         {10'000'000, {0.5, -0.6, 1.3}, {1.5, -2.5, 10.0}}};
+const InertialStep kInertialStep{{0, {0.4, -0.7, 1.1}, {1.0, -2.0, 9.0}},
+                                 {10'000'000, {0.5, -0.6, 1.3}, {1.5, -2.5, 10.0}}};
 
 ErrorMatrix transition_of(const StepJacobian& jacobian) {
   ErrorMatrix F = ErrorMatrix::Identity();
@@ -30,13 +30,13 @@ TEST(Propagation, transition_equals_the_numerical_one) {
   constexpr double kTolerance = 2e-6;  // second-order terms of central differences, and rounding
   for (unsigned seed = 1; seed <= 5; ++seed) {
     const State state = random_state(seed);
-    const ErrorMatrix F = transition_of(step_jacobian(state, kStep));
-    const State nominal = propagate(state, kStep);
+    const ErrorMatrix F = transition_of(step_jacobian(state, kInertialStep));
+    const State nominal = propagate(state, kInertialStep);
     for (int i = 0; i < error::kSize; ++i) {
       ErrorVector e = ErrorVector::Zero();
       e[i] = kDelta;
-      const ErrorVector column = (boxminus(propagate(boxplus(state, e), kStep), nominal) -
-                                  boxminus(propagate(boxplus(state, -e), kStep), nominal)) /
+      const ErrorVector column = (boxminus(propagate(boxplus(state, e), kInertialStep), nominal) -
+                                  boxminus(propagate(boxplus(state, -e), kInertialStep), nominal)) /
                                  (2.0 * kDelta);
       EXPECT_LT((F.col(i) - column).norm(), kTolerance) << "column " << i << " seed " << seed;
     }
@@ -45,14 +45,14 @@ TEST(Propagation, transition_equals_the_numerical_one) {
 
 TEST(Propagation, covariance_is_transported_by_the_transition_and_grows_by_the_noise) {
   const State state = random_state(2);
-  const StepJacobian jacobian = step_jacobian(state, kStep);
+  const StepJacobian jacobian = step_jacobian(state, kInertialStep);
   const ErrorMatrix P = random_covariance(3, 0.1);
   const ErrorMatrix F = transition_of(jacobian);
   ImuConfig noise;
   ErrorMatrix propagated = P;
-  propagate_covariance(jacobian, noise, noise_of(noise, kStep, 0.0), propagated);
+  propagate_covariance(jacobian, noise, noise_of(noise, kInertialStep, 0.0), propagated);
   const ErrorMatrix Q = propagated - F * P * F.transpose();
-  const double dt_s = kStep.duration_s();
+  const double dt_s = kInertialStep.duration_s();
   const double accel2 = noise.accel_noise_mps2_sqrthz * noise.accel_noise_mps2_sqrthz;
   EXPECT_NEAR(Q(error::kVelocity, error::kVelocity), accel2 * dt_s, 1e-12);
   EXPECT_NEAR(Q(error::kPosition, error::kVelocity), accel2 * dt_s * dt_s / 2.0, 1e-12);
@@ -81,7 +81,7 @@ TEST(Propagation, over_a_gap_the_velocity_is_uncertain_by_a_motion_that_lasts) {
   EXPECT_NEAR(std::sqrt(P(error::kPosition + 2, error::kPosition + 2)),
               speed_mps * kGap_s / std::sqrt(3.0),
               0.01 * speed_mps * kGap_s);
-  EXPECT_LT(noise_of(config, kStep, config.max_gap_s).accel2, 1e-3);
+  EXPECT_LT(noise_of(config, kInertialStep, config.max_gap_s).accel2, 1e-3);
 }
 
 /// A circle of 20 m at 8 m/s, level, sampled at 100 Hz: closed form in velocity and position.

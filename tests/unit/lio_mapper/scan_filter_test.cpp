@@ -15,20 +15,20 @@ namespace {
 
 using testing_support::RoomDrive;
 
-constexpr Nanoseconds kEpoch_ns = RoomDrive::kEpoch_ns;
-constexpr Nanoseconds kSweep_ns = 100'000'000;
+constexpr Nanoseconds kFilterEpoch_ns = RoomDrive::kEpoch_ns;
+constexpr Nanoseconds kFilterSweep_ns = 100'000'000;
 
 class ScanFilterInAHall : public testing::Test {
  protected:
   void SetUp() override {
     for (int i = 0; i <= 400; ++i) {
-      const ImuSample sample = room.imu_at(kEpoch_ns + i * 5'000'000);
+      const ImuSample sample = room.imu_at(kFilterEpoch_ns + i * 5'000'000);
       imu.push({sample.stamp_ns, sample.gyro_radps, sample.accel_mps2});
     }
   }
 
   std::unique_ptr<ScanFilter> started() const {
-    InitialState initial = level({0.0, 0.0, 9.80665}, kEpoch_ns, Config{}.imu, {});
+    InitialState initial = level({0.0, 0.0, 9.80665}, kFilterEpoch_ns, Config{}.imu, {});
     initial.state.gyro_bias_radps = room.gyro_bias_radps;
     return std::make_unique<ScanFilter>(Config{}, Pose{}, initial);
   }
@@ -36,7 +36,8 @@ class ScanFilterInAHall : public testing::Test {
   ScanOutcome process(ScanFilter& filter, int sweep) const {
     SweepDecoder decoder{SweepTimingConfig{}};
     Events events;
-    const auto decoded = decoder.decode(room.sweep_at(kEpoch_ns + sweep * kSweep_ns), events);
+    const auto decoded =
+        decoder.decode(room.sweep_at(kFilterEpoch_ns + sweep * kFilterSweep_ns), events);
     return filter.process(std::get<Sweep>(decoded), imu);
   }
 
@@ -83,7 +84,7 @@ TEST_F(ScanFilterInAHall, undistortion_ends_at_the_sweeps_end_and_matches_nearly
   const auto filter = started();
   drive(*filter, 15);
   const ScanOutcome outcome = process(*filter, 15);
-  EXPECT_NEAR(to_seconds(filter->stamp_ns() - kEpoch_ns), 1.6, 1e-6);  // float point times
+  EXPECT_NEAR(to_seconds(filter->stamp_ns() - kFilterEpoch_ns), 1.6, 1e-6);  // float point times
   EXPECT_TRUE(outcome.used);
   EXPECT_GT(outcome.share_within_10_cm, 0.7);
   EXPECT_GT(outcome.observability[0], 0.1);
@@ -121,8 +122,8 @@ TEST(Drift, tilt_noise_turns_odom_about_the_robot_and_leaves_its_place_in_map) {
   ErrorMatrix covariance = ErrorMatrix::Zero();
   add_drift_noise(drift_rate({0.0, 0.0, 1e-3}), 100.0, state, true, covariance);
   Path path;
-  path.push_back({kEpoch_ns, state.T_odom_base, state.v_odom_mps});
-  const auto H = predict_row(state, path, kEpoch_ns, Eigen::Vector3d::Zero()).jacobian;
+  path.push_back({kFilterEpoch_ns, state.T_odom_base, state.v_odom_mps});
+  const auto H = predict_row(state, path, kFilterEpoch_ns, Eigen::Vector3d::Zero()).jacobian;
   EXPECT_LT((H * covariance * H.transpose()).norm(), 1e-9);
   EXPECT_NEAR(covariance(error::kGravity, error::kGravity), 1e-4, 1e-12);
 }

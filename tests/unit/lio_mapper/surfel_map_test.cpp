@@ -16,7 +16,7 @@
 namespace trigpoint::lio_mapper {
 namespace {
 
-constexpr double kNoise_m = 0.02;  // a spinning LiDAR's range noise
+constexpr double kSurfelNoise_m = 0.02;  // a spinning LiDAR's range noise
 
 /// A square patch of a plane through `origin`, spanned by `u` and `v` (unit vectors), with noise
 /// across it.
@@ -40,7 +40,7 @@ PointCloud patch(const Eigen::Vector3d& origin,
   return cloud;
 }
 
-PointCloud ground(double z_m, unsigned seed, double noise_m = kNoise_m) {
+PointCloud ground(double z_m, unsigned seed, double noise_m = kSurfelNoise_m) {
   return patch({-10.0, -10.0, z_m},
                Eigen::Vector3d::UnitX(),
                Eigen::Vector3d::UnitY(),
@@ -122,7 +122,7 @@ TEST(SurfelMap, recovers_an_inclined_plane) {
   const Eigen::Vector3d normal = u.cross(v);
   const Eigen::Vector3d origin(100.3, -250.7, 12.9);
   const auto map = make_surfel_map({});
-  map->insert(patch(origin, u, v, 16.0, 30000, kNoise_m, 6));
+  map->insert(patch(origin, u, v, 16.0, 30000, kSurfelNoise_m, 6));
   constexpr double kNormal_rad = 0.01;
   double squares = 0.0;
   int matched = 0;
@@ -181,9 +181,9 @@ TEST(SurfelMap, a_perfect_plane_still_has_some_thickness) {
 PointCloud corner(unsigned seed) {
   const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
   PointCloud cloud =
-      patch({0.2, 0.2, 0.0}, Eigen::Vector3d::UnitY(), z, 9.0, 12000, kNoise_m, seed);
+      patch({0.2, 0.2, 0.0}, Eigen::Vector3d::UnitY(), z, 9.0, 12000, kSurfelNoise_m, seed);
   const PointCloud second =
-      patch({0.2, 0.2, 0.0}, Eigen::Vector3d::UnitX(), z, 9.0, 12000, kNoise_m, seed + 1);
+      patch({0.2, 0.2, 0.0}, Eigen::Vector3d::UnitX(), z, 9.0, 12000, kSurfelNoise_m, seed + 1);
   cloud.insert(cloud.end(), second.begin(), second.end());
   return cloud;
 }

@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 
 /// A second of a drive: 100 IMU samples, 10 fixes and clouds, which arrive 50 ms late.
-void write_drive(Rosbag2Writer& writer, int seconds = 1) {
+void write_bag_drive(Rosbag2Writer& writer, int seconds = 1) {
   for (int i = 0; i < 100 * seconds; ++i) {
     const auto imu = sample_imu(i);
     writer.write("imu/data", imu.stamp_ns, imu);
@@ -64,7 +64,7 @@ TEST(Rosbag2, reads_back_what_was_written) {
   TemporaryFolder folder;
   {
     Rosbag2Writer writer((folder / "log").string());
-    write_drive(writer);
+    write_bag_drive(writer);
     writer.close();
     EXPECT_EQ(120U, writer.messages_written());
   }
@@ -99,7 +99,7 @@ TEST(Rosbag2, delivers_in_order_of_arrival_however_it_was_written) {
   TemporaryFolder folder;
   {
     Rosbag2Writer writer((folder / "log").string());
-    write_drive(writer);
+    write_bag_drive(writer);
     writer.write("imu/data", kStart_ns - kMillisecond_ns, sample_imu(-1));
   }
   const auto entries = read_all(*open_log((folder / "log").string(), RobotConfig{}));
@@ -115,7 +115,7 @@ TEST(Rosbag2, has_the_tables_of_ros_2_humble) {
   {
     Rosbag2Writer writer((folder / "log").string());
     writer.declare_topic("datum", "sensor_msgs/msg/NavSatFix", Durability::kTransientLocal);
-    write_drive(writer);
+    write_bag_drive(writer);
   }
   const auto file = folder / "log" / "log_0.db3";
   EXPECT_THAT(
@@ -147,7 +147,7 @@ TEST(Rosbag2, metadata_says_what_ros2_bag_asks_for) {
   {
     Rosbag2Writer writer((folder / "log").string());
     writer.declare_topic("datum", "sensor_msgs/msg/NavSatFix", Durability::kTransientLocal);
-    write_drive(writer);
+    write_bag_drive(writer);
   }
   const auto info =
       YAML::LoadFile((folder / "log" / "metadata.yaml").string())["rosbag2_bagfile_information"];
@@ -177,7 +177,7 @@ TEST(Rosbag2, a_killed_recorder_leaves_a_readable_bag) {
   ASSERT_GE(child, 0);
   if (child == 0) {
     Rosbag2Writer writer(path);
-    write_drive(writer);
+    write_bag_drive(writer);
     writer.flush();
     writer.write(
         "imu/data", kStart_ns + kNanosecondsPerSecond, sample_imu(100));  // not durable yet
@@ -270,7 +270,7 @@ TEST(Rosbag2, damaged_messages_are_skipped_told_once_and_counted) {
           "imu/data", "sensor_msgs/msg/Imu", kStart_ns + (2 + i) * kMillisecond_ns, rubbish);
     }
     writer.write_cdr("points", "sensor_msgs/msg/PointCloud2", kStart_ns, rubbish);
-    write_drive(writer);
+    write_bag_drive(writer);
   }
   const auto log = open_log(path, RobotConfig{});
   EXPECT_EQ(120U, read_all(*log).size()) << "the log goes on";
@@ -329,7 +329,7 @@ TEST(Rosbag2, a_folder_without_metadata_is_a_fault) {
   const auto path = (folder / "log").string();
   {
     Rosbag2Writer writer(path);
-    write_drive(writer);
+    write_bag_drive(writer);
   }
   EXPECT_TRUE(open_log(path, RobotConfig{})->summary().faults.empty());
   fs::remove(folder / "log" / "metadata.yaml");

@@ -11,7 +11,7 @@ namespace trigpoint::simulator {
 
 namespace {
 
-const Datum kDatum{43.9456, -78.8968, 100.0, 0};
+const Datum kImuDatum{43.9456, -78.8968, 100.0, 0};
 
 TrueState at_rest(const Eigen::Quaterniond& q) {
   TrueState state;
@@ -22,7 +22,7 @@ TrueState at_rest(const Eigen::Quaterniond& q) {
 }  // namespace
 
 TEST(IdealImu, feels_gravity_upwards_and_the_turning_earth_at_rest) {
-  const EarthAtDatum earth(kDatum, true);
+  const EarthAtDatum earth(kImuDatum, true);
   const ImuSample sample = ideal_imu(at_rest(Eigen::Quaterniond::Identity()), earth);
   // Normal gravity (Somigliana) at 43.9456 degrees and 100 m by hand.
   EXPECT_NEAR(sample.accel_mps2.z(), 9.80492, 1e-4);
@@ -33,7 +33,7 @@ TEST(IdealImu, feels_gravity_upwards_and_the_turning_earth_at_rest) {
 }
 
 TEST(IdealImu, feels_the_nose_lifted_as_forward_acceleration) {
-  const EarthAtDatum earth(kDatum, false);
+  const EarthAtDatum earth(kImuDatum, false);
   const double lift = 0.1;  // nose up is a negative pitch
   const Eigen::Quaterniond q(Eigen::AngleAxisd(-lift, Eigen::Vector3d::UnitY()));
   const ImuSample sample = ideal_imu(at_rest(q), earth);
@@ -41,7 +41,7 @@ TEST(IdealImu, feels_the_nose_lifted_as_forward_acceleration) {
 }
 
 TEST(IdealImu, feels_a_left_turn_as_acceleration_to_the_left) {
-  const EarthAtDatum earth(kDatum, false);
+  const EarthAtDatum earth(kImuDatum, false);
   TrueState state = at_rest(Eigen::Quaterniond::Identity());
   state.v_map_mps = {3.0, 0.0, 0.0};
   state.omega_base_radps = {0.0, 0.0, 0.4};

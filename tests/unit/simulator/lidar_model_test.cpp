@@ -13,15 +13,15 @@ namespace trigpoint::simulator {
 
 namespace {
 
-constexpr std::uint64_t kSeed = 2;
+constexpr std::uint64_t kLidarSeed = 2;
 constexpr double kWallFace_m = 50.0;  ///< east
 
 /// A wall across the way of a robot that drives and turns.
 struct WallAhead {
   explicit WallAhead(const std::string& more = "")
       : scenario(small_scenario(more)),
-        relief(scenario.world, kSeed),
-        drive(scenario, relief, kSeed, scenario.duration_s),
+        relief(scenario.world, kLidarSeed),
+        drive(scenario, relief, kLidarSeed, scenario.duration_s),
         world(relief, {wall()}, drive.track(1.0), 120.0) {}
 
   static Shape wall() {
@@ -33,7 +33,7 @@ struct WallAhead {
   }
 
   PointCloudMessage scan(double t_s) const {
-    const SpinningLidar lidar(scenario.lidar, scenario.robot.T_base_lidar(), kSeed);
+    const SpinningLidar lidar(scenario.lidar, scenario.robot.T_base_lidar(), kLidarSeed);
     SweepEpoch sweep;
     sweep.stamp_ns = scenario.start_ns() + from_seconds(t_s);
     return lidar.scan(sweep, drive, world);

@@ -11,15 +11,15 @@ namespace trigpoint::simulator {
 
 namespace {
 
-constexpr int kSeeds = 12000;
+constexpr int kProcessSeeds = 12000;
 
 /// Mean over seeds.
 double mean_of(const std::function<double(std::uint64_t)>& value) {
   double sum = 0.0;
-  for (std::uint64_t seed = 0; seed < kSeeds; ++seed) {
+  for (std::uint64_t seed = 0; seed < kProcessSeeds; ++seed) {
     sum += value(seed);
   }
-  return sum / kSeeds;
+  return sum / kProcessSeeds;
 }
 
 }  // namespace
@@ -32,7 +32,7 @@ TEST(GaussMarkovAt, has_variance_1_and_the_exponential_covariance_at_every_lag) 
         return gauss_markov_at(t_s, kTau_s, seed) * gauss_markov_at(t_s + lag_s, kTau_s, seed);
       });
       // A product of two normals of correlation r scatters with variance 1 + r^2, at most 2.
-      EXPECT_NEAR(covariance, std::exp(-lag_s / kTau_s), variance_tolerance(kSeeds))
+      EXPECT_NEAR(covariance, std::exp(-lag_s / kTau_s), variance_tolerance(kProcessSeeds))
           << t_s << " s, lag " << lag_s << " s";
     }
   }
@@ -47,7 +47,7 @@ TEST(GaussMarkovAt, changes_by_the_same_at_every_place_of_its_grid) {
       return std::pow(gauss_markov_at(t_s + 1.0, kTau_s, seed) - gauss_markov_at(t_s, kTau_s, seed),
                       2);
     });
-    EXPECT_NEAR(measured / expected, 1.0, variance_tolerance(kSeeds)) << t_s;
+    EXPECT_NEAR(measured / expected, 1.0, variance_tolerance(kProcessSeeds)) << t_s;
   }
 }
 
@@ -56,12 +56,12 @@ TEST(RandomWalkAt, starts_at_zero_and_has_independent_increments_of_variance_t) 
   for (const double t_s : {1.0, 400.0, 20000.0}) {
     const double variance =
         mean_of([&](std::uint64_t seed) { return std::pow(random_walk_at(t_s, seed), 2); });
-    EXPECT_NEAR(variance / t_s, 1.0, variance_tolerance(kSeeds)) << t_s;
+    EXPECT_NEAR(variance / t_s, 1.0, variance_tolerance(kProcessSeeds)) << t_s;
     const double product = mean_of([&](std::uint64_t seed) {
       const double at_t = random_walk_at(t_s, seed);
       return at_t * (random_walk_at(2.0 * t_s, seed) - at_t);
     });
-    EXPECT_NEAR(product / t_s, 0.0, 5.0 / std::sqrt(kSeeds)) << t_s;
+    EXPECT_NEAR(product / t_s, 0.0, 5.0 / std::sqrt(kProcessSeeds)) << t_s;
   }
 }
 

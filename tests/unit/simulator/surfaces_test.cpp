@@ -15,7 +15,7 @@
 namespace trigpoint::simulator {
 namespace {
 
-constexpr double kRounding_m = 1e-9;
+constexpr double kSurfaceRounding_m = 1e-9;
 
 TEST(ShapeDistance, to_a_turned_box_is_the_closed_form) {
   Shape box;
@@ -29,19 +29,19 @@ TEST(ShapeDistance, to_a_turned_box_is_the_closed_form) {
                                  in_box.z());
     return surface_distance_m(box, box.centre_m + turned);
   };
-  EXPECT_NEAR(at({2.5, 0.0, 0.0}), 0.5, kRounding_m);    // before a face
-  EXPECT_NEAR(at({2.3, 1.4, 0.0}), 0.5, kRounding_m);    // off an edge: 3, 4, 5
-  EXPECT_NEAR(at({4.0, 2.0, 3.0}), 3.0, kRounding_m);    // off a corner: 2, 1, 2
-  EXPECT_NEAR(at({1.0, 0.0, 0.25}), 0.75, kRounding_m);  // inside
+  EXPECT_NEAR(at({2.5, 0.0, 0.0}), 0.5, kSurfaceRounding_m);    // before a face
+  EXPECT_NEAR(at({2.3, 1.4, 0.0}), 0.5, kSurfaceRounding_m);    // off an edge: 3, 4, 5
+  EXPECT_NEAR(at({4.0, 2.0, 3.0}), 3.0, kSurfaceRounding_m);    // off a corner: 2, 1, 2
+  EXPECT_NEAR(at({1.0, 0.0, 0.25}), 0.75, kSurfaceRounding_m);  // inside
 }
 
 TEST(ShapeDistance, to_a_post_is_the_closed_form) {
   Shape post;
   post.kind = Shape::Kind::kCylinder;
   post.half_m = {0.1, 0.1, 3.0};
-  EXPECT_NEAR(surface_distance_m(post, {0.3, 0.4, 0.0}), 0.4, kRounding_m);
-  EXPECT_NEAR(surface_distance_m(post, {0.0, 0.0, 1.0}), 0.1, kRounding_m);
-  EXPECT_NEAR(surface_distance_m(post, {0.4, 0.0, 3.4}), 0.5, kRounding_m);
+  EXPECT_NEAR(surface_distance_m(post, {0.3, 0.4, 0.0}), 0.4, kSurfaceRounding_m);
+  EXPECT_NEAR(surface_distance_m(post, {0.0, 0.0, 1.0}), 0.1, kSurfaceRounding_m);
+  EXPECT_NEAR(surface_distance_m(post, {0.4, 0.0, 3.4}), 0.5, kSurfaceRounding_m);
 }
 
 TEST(Surfaces, are_where_the_lidar_without_noise_meets_them_or_in_leaves) {

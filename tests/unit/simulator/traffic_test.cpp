@@ -17,13 +17,13 @@ namespace trigpoint::simulator {
 
 namespace {
 
-constexpr std::uint64_t kSeed = 3;
+constexpr std::uint64_t kDriversSeed = 3;
 
 struct Street {
   explicit Street(const std::string& changes = "")
-      : place("street_traffic+lidar.range_sigma_m=0+lidar.dropout=0" + changes, kSeed),
-        traffic(place.scenario, place.relief, place.drive, kSeed),
-        lidar(place.scenario.lidar, place.scenario.robot.T_base_lidar(), kSeed) {}
+      : place("street_traffic+lidar.range_sigma_m=0+lidar.dropout=0" + changes, kDriversSeed),
+        traffic(place.scenario, place.relief, place.drive, kDriversSeed),
+        lidar(place.scenario.lidar, place.scenario.robot.T_base_lidar(), kDriversSeed) {}
 
   Nanoseconds stamp_ns(double t_s) const { return place.scenario.start_ns() + from_seconds(t_s); }
 
@@ -144,7 +144,7 @@ TEST(Traffic, is_said_beside_the_truth_and_never_in_the_log) {
   std::size_t told = 0;
   StreamOptions options;
   options.on_moving = [&](const MovingSweep& sweep) { told += sweep.points.size(); };
-  const auto reader = open_scenario(scenario, kSeed, 1.0, options);
+  const auto reader = open_scenario(scenario, kDriversSeed, 1.0, options);
   reader->write_truth((folder / "truth.tum").string());
   const auto entries = all_of(*reader);
   EXPECT_EQ(reader->summary().topics.size(), 3U);
@@ -156,7 +156,7 @@ TEST(Traffic, is_said_beside_the_truth_and_never_in_the_log) {
   EXPECT_EQ(lines, told);
   EXPECT_GT(told, 0U);
   EXPECT_TRUE(std::filesystem::exists(folder / "moving_objects.txt"));
-  EXPECT_EQ(bytes_of(entries), bytes_of(entries_of(scenario, kSeed, 1.0)));
+  EXPECT_EQ(bytes_of(entries), bytes_of(entries_of(scenario, kDriversSeed, 1.0)));
   std::filesystem::remove_all(folder);
 }
 

@@ -15,7 +15,7 @@ namespace trigpoint::fusion_gate {
 namespace {
 
 constexpr Nanoseconds kInterval_ns = kNanosecondsPerSecond / 2;
-constexpr Nanoseconds kMemory_ns = 30 * kNanosecondsPerSecond;
+constexpr Nanoseconds kHeadingMemory_ns = 30 * kNanosecondsPerSecond;
 constexpr std::size_t kMostWaiting = 20;
 constexpr std::size_t kLeastSightings = 5;
 constexpr double kSigmasOfMedianDeviation = 1.4826;  // of the normal distribution
@@ -47,7 +47,7 @@ void HeadingPrior::match(const PoseBuffer& lio_poses) {
       sightings_.push_back({heading.stamp_ns,
                             wrap_angle(heading.yaw_map_rad - yaw_odom_base_rad),
                             heading.sigma_rad});
-      while (sightings_.front().stamp_ns < heading.stamp_ns - kMemory_ns) {
+      while (sightings_.front().stamp_ns < heading.stamp_ns - kHeadingMemory_ns) {
         sightings_.pop_front();
       }
     }

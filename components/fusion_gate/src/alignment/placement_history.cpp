@@ -12,7 +12,7 @@ namespace trigpoint::fusion_gate {
 
 namespace {
 
-constexpr Nanoseconds kMemory_ns = 60 * kNanosecondsPerSecond;
+constexpr Nanoseconds kPlacementMemory_ns = 60 * kNanosecondsPerSecond;
 
 /// Where T_map_odom puts a point, with its covariance.
 Odometry place(const Eigen::Vector3d& p_odom_m, const YawPose& T, const Matrix6d& covariance) {
@@ -26,7 +26,7 @@ Odometry place(const Eigen::Vector3d& p_odom_m, const YawPose& T, const Matrix6d
 
 void PlacementHistory::add(const LioStatus& lio, double distance_m) {
   placements_.push_back({lio.stamp_ns, lio.T_map_odom, lio.T_map_odom_covariance, distance_m});
-  while (placements_.front().stamp_ns < lio.stamp_ns - kMemory_ns) {
+  while (placements_.front().stamp_ns < lio.stamp_ns - kPlacementMemory_ns) {
     placements_.pop_front();
   }
 }

@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::array<double, 3> kWindows_s{2.0, 10.0, 30.0};
 constexpr double kWindowTolerance = 1.5;  // the reference is at most this much older
-constexpr Nanoseconds kMemory_ns = 50 * kNanosecondsPerSecond;
+constexpr Nanoseconds kSightingMemory_ns = 50 * kNanosecondsPerSecond;
 constexpr double kScatterWindow_s = 30.0;
 constexpr std::size_t kScatterFixes = 10;
 constexpr double kNewSolution_s = 5.0;  // after such a silence the receiver began anew
@@ -350,7 +350,7 @@ void FixMonitor::on_alignment(const Witness& witness) {
 
 void FixMonitor::keep(const Sighting& sighting) {
   sightings_.push_back(sighting);
-  while (sightings_.front().stamp_ns < sighting.stamp_ns - kMemory_ns) {
+  while (sightings_.front().stamp_ns < sighting.stamp_ns - kSightingMemory_ns) {
     sightings_.pop_front();
   }
 }
