@@ -227,6 +227,7 @@ trigpoint_msgs::msg::StateUpdate to_message(const StateUpdate& update) {
   }
   message.position_map_m(array_of(update.position_map_m));
   message.covariance_map_m2(row_major(update.covariance_map_m2));
+  message.inflation(update.inflation);
   message.lever_arm_base_m(array_of(update.lever_arm_base_m));
   message.has_first_alignment(update.first_alignment.has_value());
   message.first_alignment(to_message(update.first_alignment.value_or(Alignment{})));
@@ -243,6 +244,7 @@ StateUpdate from_message(const trigpoint_msgs::msg::StateUpdate& message) {
   }
   update.position_map_m = vector_of(message.position_map_m());
   update.covariance_map_m2 = from_row_major<3>(message.covariance_map_m2());
+  update.inflation = message.inflation();
   update.lever_arm_base_m = vector_of(message.lever_arm_base_m());
   if (message.has_first_alignment()) {
     update.first_alignment = from_message(message.first_alignment());

@@ -66,6 +66,8 @@ struct FusionGate::Impl {
   bool is_mapper_awaited(Output& out);
   void note_refused(const ToldFix& told, const PoseBuffer::Answer& lio_pose);
   void take_yaw(const YawMeasurement& yaw, Output& out);
+  bool is_lio_lost() const;
+  void hear_heading_of(const Odometry& gps_in_map);
   void tell_of_heading(const std::optional<YawPrior>& prior, Output& out);
   void judge(const AcceptedFix& fix, const PoseBuffer::Answer& lio_pose, Output& out);
   void add_pair(const AcceptedFix& fix, const PoseBuffer::Sample& at_fix, Output& out);
@@ -131,8 +133,9 @@ struct FusionGate::Impl {
   RowMaker rows;
   PoseBuffer lio_poses;
   AlignmentWindow window;
-  double window_distance_m{0.0};  // driven when the window last heard of LIO
-  HeadingPrior heading;
+  double window_distance_m{0.0};        // driven when the window last heard of LIO
+  HeadingPrior heading;                 // measured
+  HeadingPrior filter_heading;          // of the GPS filter, for where LIO is blind
   std::set<std::string> headings_told;  // what was wrong with them, once each
   FixQueue queue;  // told of, waiting for earlier fixes and for LIO to cover their stamps
   std::optional<Nanoseconds> alignment_sent_ns;  // and the mapper has not said that it has it

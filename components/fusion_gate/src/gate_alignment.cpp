@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
 #include "trigpoint/base/sentence.hpp"
+#include "trigpoint/base/so3.hpp"
 
 #include "gate.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 
 namespace trigpoint::fusion_gate {
@@ -96,6 +98,24 @@ void FusionGate::Impl::take_yaw(const YawMeasurement& yaw, Output& out) {
   }
 }
 
+/// Blind along both horizontal axes of odom, as on a field without features.
+bool FusionGate::Impl::is_lio_lost() const {
+  return lio && std::min(lio->sigma[0], lio->sigma[1]) > config.smooth.lio_blind_sigma_m;
+}
+
+/// Where LIO does not witness any way, its attitude is the gyroscopes' and still good, and the
+/// filter's heading is what the fixes tell of it. Elsewhere that is not used: LIO's way is better,
+/// and the fixes would be counted twice.
+void FusionGate::Impl::hear_heading_of(const Odometry& gps_in_map) {
+  constexpr Eigen::Index kYaw = 5;
+  const double variance_rad2 = gps_in_map.pose_covariance(kYaw, kYaw);
+  const double most_rad = config.alignment.max_yaw_sigma_rad;
+  if (is_lio_lost() && variance_rad2 > 0.0 && variance_rad2 < most_rad * most_rad) {
+    filter_heading.hear(
+        {gps_in_map.stamp_ns, yaw_of(gps_in_map.T_frame_child.q), std::sqrt(variance_rad2)});
+  }
+}
+
 /// That a heading is not used is said once an alignment.
 void FusionGate::Impl::tell_of_heading(const std::optional<YawPrior>& prior, Output& out) {
   constexpr const char* kCode = "heading_contradicted";
@@ -119,15 +139,16 @@ void FusionGate::Impl::add_pair(const AcceptedFix& fix,
   const Eigen::Vector3d variance_m2 = floored(fix.covariance_map_m2, config.min_sigma_m).diagonal();
   const Witness witness = witness_of(fix, at_fix);
   heading.match(lio_poses);
-  const std::optional<YawPrior> prior = heading.prior();
-  window.set_heading(prior);
+  filter_heading.match(lio_poses);
+  const std::optional<YawPrior> measured = heading.prior();
+  window.set_heading(measured || !is_lio_lost() ? measured : filter_heading.prior());
   const bool added = window.add({fix.stamp_ns,
                                  fix.antenna_map_m,
                                  variance_m2,
                                  antenna_odom_m,
                                  at_fix.distance_m,
                                  least_share_of(witness).mean()});
-  tell_of_heading(prior, out);
+  tell_of_heading(measured, out);
   if (!window.admitted()) {
     const std::string why = window.obstacle().value_or("no solution");
     verdicts.record(fix.stamp_ns,
@@ -224,6 +245,7 @@ void FusionGate::Impl::take_lio_status(const LioStatus& next, Output& out) {
   if (aligned() && !was_aligned) {
     window.clear();
     heading.clear();
+    filter_heading.clear();
   }
 }
 
@@ -231,6 +253,7 @@ void FusionGate::Impl::begin_epoch(const LioStatus& next, Output& out) {
   lio_poses.forget_before(next.stamp_ns);
   window.clear();
   heading.clear();
+  filter_heading.clear();
   headings_told.clear();
   refuse_waiting({"odom_epoch", "LIO began another odom epoch meanwhile"});
   alignment_sent_ns.reset();

@@ -5,8 +5,10 @@
 #include "trigpoint/base/so3.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 
 #include <algorithm>
+#include <cmath>
 
 namespace trigpoint::lio_mapper {
 
@@ -22,6 +24,10 @@ bool is_admitted(const StateUpdate& update, int axis) {
 bool admits_any(const StateUpdate& update) {
   return is_admitted(update, 0) || is_admitted(update, 1) || is_admitted(update, 2);
 }
+
+/// Where nothing else is known a fix is believed with so many times the variance that it states:
+/// receivers promise too much.
+constexpr double kTrusted = 4.0;
 
 /// The admitted axes' rows and columns, which is what is left of a Gaussian when the others are not
 /// told. The others get variance 1, which no row of H and no innovation meets.
@@ -44,9 +50,47 @@ bool is_usable(const StateUpdate& update) {
   if (update.mode == UpdateMode::kOverwrite) {
     return true;
   }
+  if (!(update.inflation >= 1.0 && std::isfinite(update.inflation))) {
+    return false;
+  }
   const Matrix3d R = admitted_covariance(update);
   return R.allFinite() && R.isApprox(R.transpose(), 1e-6) && R.llt().info() == Eigen::Success &&
          R.diagonal().minCoeff() > 0.0;
+}
+
+/// A row's covariance is inflated so that many fixes with the same error count as one. Where the
+/// prior knows less than a single fix, as behind a way that LIO could not see, there is nothing
+/// that would count twice: the fix brings the prior to its own variance (times kTrusted) and no
+/// further, which is right whatever the errors of the two have in common [S. J. Julier and J. K.
+/// Uhlmann, "A non-divergent estimation algorithm in the presence of unknown correlations", ACC
+/// 1997, with all weight on the fix]: 1 / r = 1 / own - 1 / prior, direction by direction in units
+/// of the fix's own covariance.
+Matrix3d inflated_where_needed(const Matrix3d& inflated_m2,
+                               double inflation,
+                               const Matrix3d& prior_m2) {
+  if (inflation <= kTrusted) {
+    return inflated_m2;
+  }
+  const Eigen::LLT<Matrix3d> root(inflated_m2 / inflation);
+  const Matrix3d half = root.matrixL().solve(prior_m2);
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> prior(root.matrixL().solve(half.transpose()));
+  Vector3d times_own = Vector3d::Constant(inflation);
+  for (int i = 0; i < 3; ++i) {
+    const double known = 1.0 / kTrusted - 1.0 / std::max(prior.eigenvalues()[i], kTrusted);
+    times_own[i] = known * inflation > 1.0 ? 1.0 / known : inflation;
+  }
+  const Matrix3d directions = root.matrixL() * prior.eigenvectors();
+  return directions * times_own.asDiagonal() * directions.transpose();
+}
+
+/// Of an error of the place in odom the part that is a slide: all of it along axes where it is
+/// large, nothing where the map holds the place.
+Matrix3d slid_share(const Matrix3d& place_odom_m2) {
+  constexpr double kHeld_m = 0.03;
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> axes(place_odom_m2);
+  const Eigen::Array3d m2 = axes.eigenvalues().array().max(0.0);
+  return axes.eigenvectors() * (m2 / (m2 + kHeld_m * kHeld_m)).matrix().asDiagonal() *
+         axes.eigenvectors().transpose();
 }
 
 /// The standard update with the admitted rows, in place.
@@ -63,7 +107,9 @@ void condition_on(const StateUpdate& update,
     }
   }
   const Eigen::Matrix<double, 3, error::kSize> HP = H * covariance;
-  const Matrix3d S = HP * H.transpose() + admitted_covariance(update);
+  const Matrix3d prior_m2 = HP * H.transpose();
+  const Matrix3d S =
+      prior_m2 + inflated_where_needed(admitted_covariance(update), update.inflation, prior_m2);
   const Eigen::Matrix<double, 3, error::kSize> gain_transposed = S.llt().solve(HP);
   state = boxplus(state, gain_transposed.transpose() * innovation);
   covariance -= HP.transpose() * gain_transposed;
@@ -235,24 +281,37 @@ void RowHistory::align(const Alignment& alignment) {
   // The gate took odom as level. What it found holds where the robot is; the tilt that the gravity
   // states know turns the rest about that place, and so does their error:
   // e_t = e_t(gate) - D e_g with D the displacement of the place by the gravity errors.
+  // It holds for the place that the filter states, whatever LIO slid on the way there: along what
+  // the map does not hold e_p is counted from here. The slide's velocity is as unknown as before:
+  // were it taken for confirmed with the place, it would go on.
   constexpr int kAt = error::kYawMapOdom;
   const Vector3d here_odom_m = newest().state.T_odom_base.p;
-  const auto set = [&](State& state, ErrorMatrix& covariance) {
+  Eigen::Matrix<double, 3, error::kSize> to_slide_here =  // from the error at a record
+      Eigen::Matrix<double, 3, error::kSize>::Zero();
+  to_slide_here.middleCols<3>(error::kPosition) =
+      slid_share(newest().covariance.block<3, 3>(error::kPosition, error::kPosition));
+  const auto set = [&](State& state) {
     state.T_map_odom = alignment.T_map_odom;
     state.T_map_odom.p +=
         alignment.T_map_odom.pose().q * here_odom_m - state.placement().pose().q * here_odom_m;
-    ErrorMatrix to_aligned = ErrorMatrix::Identity();
-    to_aligned.block<4, 4>(kAt, kAt).setZero();
-    to_aligned.block<3, 2>(error::kPositionMapOdom, error::kGravity) =
-        -placed_point_by_gravity(state, here_odom_m);
-    covariance = (to_aligned * covariance * to_aligned.transpose()).eval();
-    covariance.block<4, 4>(kAt, kAt) += alignment.covariance;
   };
-  for (ScanRecord& record : records_) {
-    record.rows.clear();  // of an alignment that was replaced
-    set(record.before_rows, record.covariance_before_rows);
-    set(record.state_odom_free, record.covariance);
-    set(record.state, record.covariance);
+  for (auto record = records_.rbegin(); record != records_.rend(); ++record) {
+    record->rows.clear();  // of an alignment that was replaced
+    set(record->before_rows);
+    set(record->state_odom_free);
+    set(record->state);
+    ErrorMatrix to_aligned = ErrorMatrix::Identity();
+    to_aligned.middleRows<3>(error::kPosition) -= to_slide_here;
+    to_aligned.middleRows<4>(kAt).setZero();
+    to_aligned.middleCols<4>(kAt).setZero();
+    to_aligned.block<3, 2>(error::kPositionMapOdom, error::kGravity) =
+        -placed_point_by_gravity(record->state, here_odom_m);
+    for (ErrorMatrix* covariance : {&record->covariance_before_rows, &record->covariance}) {
+      *covariance = (to_aligned * *covariance * to_aligned.transpose()).eval();
+      covariance->block<4, 4>(kAt, kAt) += alignment.covariance;
+      make_symmetric(*covariance);
+    }
+    to_slide_here = (to_slide_here * record->transition).eval();
   }
 }
 

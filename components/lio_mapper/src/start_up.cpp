@@ -26,6 +26,10 @@ constexpr double kTiltMoving_rad = 0.1;
 /// The trial matches against a map that its own first motion built.
 constexpr double kTrialSigmaFactor = 2.0;
 constexpr double kVelocityMoving_mps = 0.5;
+/// A sweep that leaves more than this share of a speed's prior sigma has not seen the speed.
+constexpr double kUnseenSpeed = 0.5;
+/// Of the first velocity where no scan tells it: most robots start at rest or at a walking pace.
+constexpr double kVelocityUnseen_mps = 2.0;
 constexpr int kRefinements = 2;
 constexpr int kTrials = 3;
 
@@ -44,6 +48,7 @@ InitialState with_velocity(InitialState initial, const Vector3d& v_base_mps, dou
 struct Trial {
   double share{0.0};
   Vector3d v_base_mps{Vector3d::Zero()};  ///< at the start, as the second scan corrected it
+  double forward_sigma_mps{0.0};          ///< after the second scan
 };
 
 /// Runs the first two sweeps from `initial` and tells how well the second fits the first.
@@ -61,27 +66,40 @@ Trial try_start(const Config& config,
   }
   const ScanOutcome outcome = filter.process(sweeps[1], imu);
   const Vector3d correction_mps = filter.state().v_odom_mps - unaided.v_odom_mps;
+  const Vector3d forward_odom = filter.state().T_odom_base.q * Vector3d::UnitX();
+  const double forward_variance = forward_odom.dot(
+      filter.covariance().block<3, 3>(error::kVelocity, error::kVelocity) * forward_odom);
   return {outcome.used ? outcome.share_within_10_cm : 0.0,
-          initial.state.T_odom_base.q.conjugate() * (initial.state.v_odom_mps + correction_mps)};
+          initial.state.T_odom_base.q.conjugate() * (initial.state.v_odom_mps + correction_mps),
+          std::sqrt(std::max(0.0, forward_variance))};
 }
 
-/// First velocity in base axes: zero unless a forward speed explains the second sweep clearly
-/// better.
-Vector3d find_velocity(const Config& config,
-                       const Pose& T_base_lidar,
-                       const ImuBuffer& imu,
-                       const std::deque<Sweep>& sweeps,
-                       const InitialState& initial) {
+struct FirstVelocity {
+  Vector3d base_mps;
+  bool is_seen;  ///< by the sweeps, along base x
+};
+
+/// Zero unless a forward speed explains the second sweep clearly better. On a plain all speeds fit
+/// alike, and by which of them more points find a plane is chance: a speed counts only where the
+/// sweep determines it.
+FirstVelocity find_velocity(const Config& config,
+                            const Pose& T_base_lidar,
+                            const ImuBuffer& imu,
+                            const std::deque<Sweep>& sweeps,
+                            const InitialState& initial) {
   const double step_mps = config.start.speed_step_mps;
   const auto attempt = [&](const Vector3d& v_base_mps) {
     return try_start(
         config, T_base_lidar, imu, sweeps, with_velocity(initial, v_base_mps, step_mps));
   };
   const Trial standing = attempt(Vector3d::Zero());
+  const auto sees_speed = [step_mps](const Trial& trial) {
+    return trial.forward_sigma_mps < kUnseenSpeed * step_mps;
+  };
   Trial best = standing;
   for (double speed = -kBackwardSpeed_mps; speed <= config.start.max_speed_mps; speed += step_mps) {
     const Trial trial = attempt(speed * Vector3d::UnitX());
-    if (trial.share > best.share) {
+    if (trial.share > best.share && sees_speed(trial)) {
       best = trial;
     }
   }
@@ -91,7 +109,7 @@ Vector3d find_velocity(const Config& config,
   for (int i = 0; i < kRefinements; ++i) {
     best = attempt(best.v_base_mps);
   }
-  return best.v_base_mps;
+  return {best.v_base_mps, sees_speed(best)};
 }
 
 /// A start as a trial run over the waiting sweeps corrects it.
@@ -280,19 +298,18 @@ StartResult start(const Config& configured,
             stamp_ns,
             config.imu,
             {kTiltMoving_rad, kVelocityMoving_mps, config.imu.initial_gyro_bias_sigma_radps});
-  Vector3d v_base = Vector3d::Zero();
+  FirstVelocity first{Vector3d::Zero(), true};
   if (sweeps.size() >= 2) {
-    v_base = find_velocity(config, T_base_lidar, imu, sweeps, result.initial);
+    first = find_velocity(config, T_base_lidar, imu, sweeps, result.initial);
   }
+  Vector3d v_base = first.base_mps;
+  const double v_sigma_mps = first.is_seen ? kVelocityMoving_mps : kVelocityUnseen_mps;
   // Two sweeps alone leave decimetres a second; all that wait leave centimetres.
   const bool is_quiet = looks_at_rest(summary);
   const auto stands = [&] { return is_quiet && v_base.norm() < config.start.rest_speed_mps; };
   for (int i = 0; i < kTrials && !stands(); ++i) {
-    const Relevelled found = relevel(config,
-                                     T_base_lidar,
-                                     imu,
-                                     sweeps,
-                                     with_velocity(result.initial, v_base, kVelocityMoving_mps));
+    const Relevelled found = relevel(
+        config, T_base_lidar, imu, sweeps, with_velocity(result.initial, v_base, v_sigma_mps));
     v_base = found.v_base_mps;
     // The prior of the next trial is as open as the first one's: the same data must not count
     // twice.
@@ -307,13 +324,15 @@ StartResult start(const Config& configured,
   result.speed_mps = v_base.norm();
   result.at_rest = stands();
   if (result.at_rest) {
-    result.initial = level(force, stamp_ns, config.imu, {});
+    StartSigmas sigmas;
+    sigmas.velocity_mps = first.is_seen ? sigmas.velocity_mps : kVelocityUnseen_mps;
+    result.initial = level(force, stamp_ns, config.imu, sigmas);
     result.initial.state.gyro_bias_radps = summary.mean_gyro_radps;
     result.initial.state.accel_bias_mps2 =
         (force.norm() - kStandardGravity_mps2) * force.normalized();
     return result;
   }
-  result.initial = with_velocity(result.initial, v_base, kVelocityMoving_mps);
+  result.initial = with_velocity(result.initial, v_base, v_sigma_mps);
   return result;
 }
 

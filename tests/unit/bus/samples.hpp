@@ -152,6 +152,7 @@ inline StateUpdate state_update() {
   update.decision = {AxisDecision::kFused, AxisDecision::kCoast, AxisDecision::kLio};
   update.position_map_m = {-1.0, -2.0, -3.0};
   update.covariance_map_m2 = counting_matrix<3>(0.75);
+  update.inflation = 51.0;
   update.lever_arm_base_m = {0.3, 0.2, 1.1};
   update.first_alignment =
       Alignment{6, {0.25, {100.0, 200.0, 300.0}}, counting_matrix<4>(400.0), true};
@@ -328,6 +329,7 @@ inline void expect_equal(const StateUpdate& a, const StateUpdate& b) {
   EXPECT_EQ(a.decision, b.decision);
   EXPECT_EQ(a.position_map_m, b.position_map_m);
   EXPECT_EQ(a.covariance_map_m2, b.covariance_map_m2);
+  EXPECT_EQ(a.inflation, b.inflation);
   EXPECT_EQ(a.lever_arm_base_m, b.lever_arm_base_m);
   ASSERT_EQ(a.first_alignment.has_value(), b.first_alignment.has_value());
   if (a.first_alignment) {

@@ -124,6 +124,20 @@ struct Heard {
   int contradictions{0};
 };
 
+Heard heard_in(const Record& record, Nanoseconds start_ns) {
+  Heard heard{record, std::nullopt, 0.0, 0};
+  for (const StateUpdate& update : heard.record.updates) {
+    if (update.first_alignment && !heard.aligned_s) {
+      heard.aligned_s = to_seconds(update.fix_stamp_ns - start_ns);
+      heard.yaw_rad = update.first_alignment->T_map_odom.yaw_rad;
+    }
+  }
+  for (const Event& event : heard.record.events) {
+    heard.contradictions += event.code == "heading_contradicted" ? 1 : 0;
+  }
+  return heard;
+}
+
 /// Drives with a heading every half second, `offset_rad` wrong.
 Heard drive_with_headings(std::optional<double> offset_rad, double sigma_rad) {
   SimulatedDrive drive{coarse()};
@@ -135,17 +149,7 @@ Heard drive_with_headings(std::optional<double> offset_rad, double sigma_rad) {
           drive.gate().on_yaw({drive.stamp(now_s), "", from_yaw(yaw_rad), sigma_rad * sigma_rad}));
     }
   }
-  Heard heard{drive.record(), std::nullopt, 0.0, 0};
-  for (const StateUpdate& update : heard.record.updates) {
-    if (update.first_alignment && !heard.aligned_s) {
-      heard.aligned_s = to_seconds(update.fix_stamp_ns - drive.stamp(0.0));
-      heard.yaw_rad = update.first_alignment->T_map_odom.yaw_rad;
-    }
-  }
-  for (const Event& event : heard.record.events) {
-    heard.contradictions += event.code == "heading_contradicted" ? 1 : 0;
-  }
-  return heard;
+  return heard_in(drive.record(), drive.stamp(0.0));
 }
 
 TEST(FusionGate, aligns_sooner_with_a_heading_where_fixes_are_coarse) {
@@ -166,6 +170,32 @@ TEST(FusionGate, leaves_a_wrong_heading_out_and_says_so_once) {
       wrap_angle(wrong.yaw_rad - Scenario{}.T_map_odom.yaw_rad), 0.0, 1.0 * kPriorDegree_rad);
   EXPECT_DOUBLE_EQ(*wrong.aligned_s, *without.aligned_s);
   EXPECT_EQ(wrong.contradictions, 1);
+}
+
+Heard drive_with_filter(Scenario scenario, double yaw_sigma_rad, double slide_mps) {
+  scenario.duration_s = 60.0;
+  scenario.gps_yaw_sigma_rad = yaw_sigma_rad;
+  scenario.slide_mps = slide_mps;
+  SimulatedDrive drive{scenario};
+  const Record record = drive.run();
+  return heard_in(record, drive.stamp(0.0));
+}
+
+/// LIO witnesses no way there, but its attitude holds; nothing else tells the heading.
+TEST(FusionGate, aligns_on_a_featureless_field_by_the_heading_of_the_gps_filter) {
+  const Heard field = drive_with_filter({}, 0.5 * kPriorDegree_rad, 1.2);
+  ASSERT_TRUE(field.aligned_s);
+  EXPECT_LT(*field.aligned_s, 15.0);
+  EXPECT_NEAR(
+      wrap_angle(field.yaw_rad - Scenario{}.T_map_odom.yaw_rad), 0.0, 0.5 * kPriorDegree_rad);
+  EXPECT_FALSE(drive_with_filter({}, 3.14, 1.2).aligned_s) << "of which the filter knows nothing";
+}
+
+TEST(FusionGate, leaves_the_heading_of_the_gps_filter_alone_where_lio_holds) {
+  const Heard with = drive_with_filter(coarse(), 0.5 * kPriorDegree_rad, 0.0);
+  const Heard without = drive_with_filter(coarse(), 3.14, 0.0);
+  ASSERT_TRUE(with.aligned_s && without.aligned_s);
+  EXPECT_DOUBLE_EQ(*with.aligned_s, *without.aligned_s);
 }
 
 TEST(FusionGate, refuses_what_is_no_heading_by_name_once) {

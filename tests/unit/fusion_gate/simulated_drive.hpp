@@ -33,6 +33,8 @@ struct Scenario {
   YawPose T_map_odom{2.9, {20.0, -30.0, 4.0}};
   Eigen::Vector3d antenna_position_base_m{0.4, 0.1, 0.9};
   double yaw_floor_sigma_rad{RobotConfig{}.yaw_floor_sigma_rad};
+  double gps_yaw_sigma_rad{3.14};  ///< of gps/odometry
+  double slide_mps{0.0};           ///< LIO falls so much behind along odom's x, and says so
   double duration_s{30.0};
   double speed_mps{1.2};
   double gps_odometry_hz{20.0};
@@ -150,6 +152,7 @@ class SimulatedDrive {
     odometry.child_frame_id = "base_link";
     odometry.T_frame_child = T_odom_base(now_s);
     odometry.T_frame_child.p += lio_found_elsewhere_m;
+    odometry.T_frame_child.p.x() -= scenario_.slide_mps * now_s;
     odometry.pose_covariance = PoseCovariance::Identity() * 1e-4;
     return odometry;
   }
@@ -160,6 +163,8 @@ class SimulatedDrive {
     message.odom_epoch = epoch;
     message.health = LioHealth::kOk;
     message.aligned = alignment_.has_value();
+    const double slid_m = scenario_.slide_mps * now_s;
+    message.sigma[0] = message.sigma[1] = std::max(0.01, slid_m);
     if (alignment_) {
       message.T_map_odom = alignment_->T_map_odom;
       message.T_map_odom_covariance.setZero();
@@ -231,6 +236,7 @@ class SimulatedDrive {
     const double sigma_m = reception_at(now_s).sigma_m;
     odometry.pose_covariance.topLeftCorner<3, 3>() =
         Eigen::Matrix3d::Identity() * sigma_m * sigma_m;
+    odometry.pose_covariance(5, 5) = scenario_.gps_yaw_sigma_rad * scenario_.gps_yaw_sigma_rad;
     keep(gate_.on_gps_odometry(odometry, "gps-a"));
   }
 

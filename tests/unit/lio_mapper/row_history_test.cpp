@@ -342,6 +342,92 @@ TEST_F(FixedOdom, the_first_alignment_holds_where_the_robot_is_however_odom_is_t
   EXPECT_LT((H * newest.covariance * H.transpose() - expected).norm(), 1e-9);
 }
 
+/// A filter that nothing holds goes straight on at a velocity that is wrong by 5 m/s, as it says it
+/// may be, for 40 scans; rows every second scan after the alignment.
+struct Slide {
+  ErrorVector error;  ///< at the end
+  ErrorMatrix covariance;
+  double place_error_m;
+};
+
+Slide aligned_after_a_slide(int scans_after) {
+  const double scan_s = to_seconds(kScan_ns);
+  constexpr double kWrong_mps = 5.0;
+  constexpr int kBefore = 40;
+  ErrorMatrix M = ErrorMatrix::Identity();
+  M.block<3, 3>(error::kPosition, error::kVelocity) = scan_s * Eigen::Matrix3d::Identity();
+  ErrorMatrix Q = ErrorMatrix::Zero();
+  Q.diagonal().segment<3>(error::kVelocity).setConstant(1e-4);
+  RowHistory history(RowsConfig{});
+  State state;
+  state.v_odom_mps = {kWrong_mps, 0.0, 0.0};  // in truth it stands
+  state.gravity_odom_mps2 = {0.0, 0.0, -9.80665};
+  ErrorMatrix covariance = 1e-10 * ErrorMatrix::Identity();
+  covariance.diagonal().segment<3>(error::kVelocity).setConstant(25.0);
+  for (int i = 0; i < kBefore + scans_after; ++i) {
+    ScanRecord record;
+    record.stamp_ns = (i + 1) * kScan_ns;
+    PathNode node;
+    node.stamp_ns = i * kScan_ns;
+    node.T_odom_base = state.T_odom_base;
+    node.v_odom_mps = state.v_odom_mps;
+    record.path.push_back(node);
+    state.T_odom_base.p += scan_s * state.v_odom_mps;
+    node.stamp_ns = record.stamp_ns;
+    node.T_odom_base = state.T_odom_base;
+    record.path.push_back(node);
+    record.before_rows = state;
+    record.covariance_before_rows = M * covariance * M.transpose() + Q;
+    record.transition = M;
+    history.push(record);
+    if (i + 1 == kBefore) {
+      const Alignment alignment{0, {0.0, -state.T_odom_base.p}, 1e-4 * Eigen::Matrix4d::Identity()};
+      history.align(alignment);
+    } else if (i >= kBefore && i % 2 == 0) {
+      EXPECT_EQ(history.apply(row(record.stamp_ns, {0.0, 0.0, 0.0}, 0.03)).outcome,
+                RowOutcome::kApplied);
+    }
+    state = history.newest().state;
+    covariance = history.newest().covariance;
+  }
+  State truth = state;
+  truth.v_odom_mps.setZero();
+  return {
+      boxminus(truth, state), covariance, (state.placement().pose() * state.T_odom_base.p).norm()};
+}
+
+TEST(RowHistory, what_slid_before_the_alignment_does_not_slide_on) {
+  const Slide slide = aligned_after_a_slide(20);
+  EXPECT_LT(slide.place_error_m, 0.1);
+  const double error_mps = slide.error.segment<3>(error::kVelocity).norm();
+  const double sigma_mps = std::sqrt(slide.covariance(error::kVelocity, error::kVelocity));
+  EXPECT_LT(error_mps, 0.2);
+  EXPECT_LT(error_mps, 3.0 * sigma_mps);
+  EXPECT_LT(sigma_mps, 0.5);
+}
+
+/// Along x, of a row of its own sigma 0.5 m inflated 51 times, for a prior of this sigma.
+double sigma_after_inflated_row(double prior_sigma_m) {
+  const Chain chain;
+  ErrorMatrix covariance = 1e-10 * ErrorMatrix::Identity();
+  covariance.diagonal().head<3>().setConstant(prior_sigma_m * prior_sigma_m);
+  ScanRecord record = chain.scan(0, chain.start, covariance);
+  record.covariance_before_rows = covariance;
+  RowHistory history(RowsConfig{}, false);
+  history.push(record);
+  StateUpdate update = row(kScan_ns, truth_map_m(chain), 0.5);
+  update.covariance_map_m2 = 51.0 * 0.25 * Eigen::Matrix3d::Identity();
+  update.inflation = 51.0;
+  EXPECT_EQ(history.apply(update).outcome, RowOutcome::kApplied);
+  return std::sqrt(history.newest().covariance(0, 0));
+}
+
+TEST(RowHistory, a_fix_counts_in_full_where_nothing_better_is_known_and_only_there) {
+  EXPECT_NEAR(sigma_after_inflated_row(100.0), 2.0 * 0.5, 1e-3);
+  EXPECT_NEAR(sigma_after_inflated_row(2.0), 2.0 * 0.5, 1e-3);
+  EXPECT_NEAR(sigma_after_inflated_row(0.5), std::sqrt(1.0 / (4.0 + 4.0 / 51.0)), 1e-6);
+}
+
 TEST_F(FixedOdom, refuses_what_cannot_be_used_and_says_why) {
   const Eigen::Vector3d p = truth_map_m(chain);
   EXPECT_EQ(history.apply(row(-kScan_ns, p, 0.1)).reason, "older_than_history");
@@ -350,6 +436,9 @@ TEST_F(FixedOdom, refuses_what_cannot_be_used_and_says_why) {
   EXPECT_EQ(history.apply(nan).reason, "not_a_gaussian");
   StateUpdate zero = row(kScan_ns, p, 0.0);
   EXPECT_EQ(history.apply(zero).reason, "not_a_gaussian");
+  StateUpdate deflated = row(kScan_ns, p, 0.1);
+  deflated.inflation = 0.5;
+  EXPECT_EQ(history.apply(deflated).reason, "not_a_gaussian");
   EXPECT_EQ(history.apply(row(3 * kScan_ns, p, 0.1)).outcome, RowOutcome::kApplied);
   EXPECT_EQ(history.apply(row(3 * kScan_ns, p, 0.1)).reason, "fix_already_used");
 }

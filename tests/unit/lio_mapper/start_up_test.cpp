@@ -119,6 +119,35 @@ TEST(StartUp, knows_that_it_stands_although_two_noisy_sweeps_seem_to_move) {
   }
 }
 
+/// An open field: a floor and nothing else.
+class FieldDrive final : public testing_support::RoomDrive {
+ public:
+  explicit FieldDrive(unsigned seed) : RoomDrive(10.0) {
+    range_sigma_m = 0.02;
+    noise_seed = 100 * seed;
+  }
+
+ private:
+  double cast(const Eigen::Vector3d& from, const Eigen::Vector3d& direction) const override {
+    constexpr double kFloor_m = -0.7;
+    constexpr double kReach_m = 100.0;
+    const double range_m = (kFloor_m - from.z()) / std::min(direction.z(), -1e-9);
+    return range_m < kReach_m ? range_m : 0.0;  // no return
+  }
+};
+
+/// All speeds fit there alike; one of them was taken for true.
+TEST(StartUp, makes_up_no_speed_where_nothing_tells_one) {
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    const StartResult result = start_of(FieldDrive(seed));
+    ASSERT_FALSE(result.trouble.has_value());
+    EXPECT_TRUE(result.at_rest) << "speed " << result.speed_mps << " m/s";
+    const auto velocity =
+        result.initial.covariance.block<3, 3>(error::kVelocity, error::kVelocity).diagonal();
+    EXPECT_GE(std::sqrt(velocity.x()), 1.0) << "as if it were known to stand";
+  }
+}
+
 TEST(StartUp, knows_that_it_drives_although_the_imu_is_quiet) {
   testing_support::RoomDrive drive(0.0, 2.0);
   const StartResult result = start_of(drive);

@@ -21,7 +21,8 @@ RowMaker::RowMaker(const Config& config, const Eigen::Vector3d& antenna_position
 
 StateUpdate RowMaker::make(const AcceptedFix& fix, const AxisChoices& choices) {
   StateUpdate update = describe(fix);
-  update.covariance_map_m2 *= inflation(fix.stamp_ns);
+  update.inflation = inflation(fix.stamp_ns);
+  update.covariance_map_m2 *= update.inflation;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     update.decision[axis] = choices[axis].decision;
   }

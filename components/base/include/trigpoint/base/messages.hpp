@@ -138,6 +138,7 @@ struct StateUpdate {
   std::array<AxisDecision, 3> decision{AxisDecision::kLio, AxisDecision::kLio, AxisDecision::kLio};
   Eigen::Vector3d position_map_m{Eigen::Vector3d::Zero()};
   Eigen::Matrix3d covariance_map_m2{Eigen::Matrix3d::Identity() * kUnknownVariance};
+  double inflation{1.0};  ///< the covariance is the fix's own times this; at least 1
   Eigen::Vector3d lever_arm_base_m{Eigen::Vector3d::Zero()};  ///< zero: the row is about base_link
   std::optional<Alignment> first_alignment;
 };
