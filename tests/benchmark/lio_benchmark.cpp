@@ -7,8 +7,10 @@
 #include "trigpoint/lio_mapper/lio_mapper.hpp"
 #include "trigpoint/recording/log.hpp"
 
+#include "downsample.hpp"
 #include "ikd_tree.hpp"
 #include "input.hpp"
+#include "local_map.hpp"
 #include "sweep.hpp"
 #include <CLI/CLI.hpp>
 #include <pcl/filters/voxel_grid.h>
@@ -100,6 +102,7 @@ struct Result {
   Series match_and_insert;
   std::size_t map_bytes{0};
   PointCloud map_points;
+  std::vector<PointCloud> scans_odom;  ///< thinned as for matching
   std::uint64_t scans_used{0};
 };
 
@@ -137,6 +140,9 @@ Result run(const cli::InputOptions& options, const std::string& kind) {
     }
     result.total.values.push_back(std::exchange(spent_ms, 0.0));
     result.match_and_insert.values.push_back(stages.at(Stage::kMatch) + stages.at(Stage::kInsert));
+    result.scans_odom.push_back(
+        lio_mapper::downsample(output.scans.front().points_odom, config.matching.voxel_m));
+    clock.take();  // the thinning is not the mapper's
   }
   result.map_bytes = mapper.map_memory_bytes();
   result.map_points = mapper.local_map();
@@ -183,6 +189,29 @@ Series reference(const cli::InputOptions& options) {
     series.values.push_back(cpu_ms() - before_ms);
     previous = thinned;
   }
+  return series;
+}
+
+/// CPU time of a map alone: each scan's points looked up, then inserted. What the mapper's stage
+/// "match" does besides (rows of the normal matrix and their sums) is the same for both maps.
+Series map_alone(const cli::InputOptions& options,
+                 const std::string& kind,
+                 const std::vector<PointCloud>& scans_odom) {
+  lio_mapper::LocalMapConfig config = cli::open_input(options).config.cores.lio_mapper.local_map;
+  config.kind = kind;
+  const auto map = lio_mapper::make_local_map(config);
+  Series series;
+  std::size_t found = 0;
+  for (const PointCloud& scan : scans_odom) {
+    const double before_ms = cpu_ms();
+    for (const PointXyzi& point : scan) {
+      lio_mapper::PlaneMatch plane;
+      found += map->match_surface(point.position().cast<double>(), plane) ? 1 : 0;
+    }
+    map->insert(scan);
+    series.values.push_back(cpu_ms() - before_ms);
+  }
+  std::printf("  (%s alone: %zu planes found)\n", kind.c_str(), found);
   return series;
 }
 
@@ -291,6 +320,14 @@ int measure(const cli::InputOptions& options, const std::vector<std::string>& ki
                 ikd.match_and_insert.mean() / surfel.match_and_insert.mean(),
                 ikd.total.mean() / surfel.total.mean(),
                 static_cast<double>(ikd.map_bytes) / static_cast<double>(surfel.map_bytes));
+    const Series ikd_alone = map_alone(options, "ikd_tree", surfel.scans_odom);
+    const Series surfel_alone = map_alone(options, "surfel_map", surfel.scans_odom);
+    std::printf(
+        "the maps alone, a scan looked up and inserted: ikd_tree %.3f ms, surfel_map %.3f ms, "
+        "ratio %.2f\n",
+        ikd_alone.mean(),
+        surfel_alone.mean(),
+        ikd_alone.mean() / surfel_alone.mean());
   }
   if (results.contains("ikd_tree") && !results["ikd_tree"].map_points.empty()) {
     const NeighbourCosts costs = compare_neighbours(results["ikd_tree"].map_points);
