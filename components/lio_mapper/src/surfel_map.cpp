@@ -30,7 +30,7 @@ constexpr double kSameSurface = 0.2;
 constexpr double kUnitsOfParent = 54000.0;
 
 /// Leaves that there is room for. Most parents hold a piece of one surface: three to nine leaves.
-constexpr std::array<std::uint32_t, 5> kRoom{2, 4, 8, 16, 27};
+constexpr std::array<std::uint32_t, 7> kRoom{2, 4, 6, 9, 14, 20, 27};
 
 constexpr std::size_t kFirstTable = 1024;
 
@@ -38,7 +38,7 @@ constexpr std::size_t kFirstTable = 1024;
 template <typename T>
 void grow_for(std::vector<T>& vector, std::size_t more) {
   if (vector.size() + more > vector.capacity()) {
-    vector.reserve(vector.size() + std::max<std::size_t>(vector.size() / 4, 256) + more);
+    vector.reserve(vector.size() + std::max<std::size_t>(vector.size() / 8, 256) + more);
   }
 }
 

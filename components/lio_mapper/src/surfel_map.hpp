@@ -179,7 +179,7 @@ class SurfelMap final : public LocalMap {
   std::size_t leaf_count_{0};
   mutable std::vector<Parent> parents_;  ///< mutable because planes are fitted when asked for
   std::vector<Leaf> leaves_;             ///< in blocks of the size classes
-  std::array<std::vector<std::uint32_t>, 5> free_blocks_;  ///< of each size class
+  std::array<std::vector<std::uint32_t>, 7> free_blocks_;  ///< of each size class
   std::vector<ParentId> table_;  ///< open addressing by parents' indices, a power of two long
 };
 
