@@ -21,6 +21,7 @@ namespace {
 using namespace std::chrono_literals;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using namespace tests;
 
 constexpr auto kForever = 30s;
@@ -117,6 +118,22 @@ TEST_F(HostRestart, does_not_try_again_what_cannot_be) {
   const auto ended = host({"base", "--config", folder_.path("c.yaml")})->wait(kForever);
   EXPECT_EQ(ended.exit_code, 1) << ended.output;
   EXPECT_THAT(ended.output, HasSubstr("giving up"));
+}
+
+TEST_F(HostRestart, with_a_discovery_server_has_nothing_that_a_kill_leaves_in_shared_memory) {
+  if (run_command({"sh", "-c", "command -v fast-discovery-server"}).exit_code != 0) {
+    GTEST_SKIP() << "fast-discovery-server (package fastdds-tools) is not installed";
+  }
+  const std::string server = "discovery_server";
+  const auto running = host({"gate", "--discovery-server", "127.0.0.1:11877", "--serve-discovery"});
+  const auto is_up = [&] { return log_of(server).find("SERVER") != std::string::npos; };
+  ASSERT_TRUE(comes_true(is_up)) << running->output_so_far() << log_of(server);
+  const int first = pid_of(server);
+  EXPECT_THAT(read_file("/proc/" + std::to_string(first) + "/maps"), Not(HasSubstr("/dev/shm")));
+  kill(first, SIGKILL);
+  ASSERT_TRUE(comes_true([&] { return pid_of(server) != first; })) << running->output_so_far();
+  running->signal(SIGTERM);
+  running->wait(kForever);
 }
 
 TEST_F(HostRestart, is_not_reached_with_security_and_a_discovery_server) {
