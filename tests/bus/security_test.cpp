@@ -2,6 +2,7 @@
 // Copyright the Trigpoint developers
 // DDS-Security with the credentials of bringup/make-credentials: who has them reads and writes,
 // across vendors too; who has none, or those of somebody else, does neither.
+#include "trigpoint/base/config.hpp"
 #include "trigpoint/bus/convert.hpp"
 #include "trigpoint/bus/topics.hpp"
 
@@ -23,6 +24,7 @@ using ::testing::AnyOf;
 using testing::Collected;
 using ::testing::Contains;
 using ::testing::Each;
+using ::testing::HasSubstr;
 using ::testing::Not;
 using testing::own_domain;
 using testing::Readers;
@@ -161,7 +163,20 @@ TEST_P(Security, names_a_file_that_is_missing) {
     Participant participant(secured(folder), "incomplete");
     FAIL() << "accepted";
   } catch (const std::runtime_error& error) {
-    EXPECT_THAT(error.what(), ::testing::HasSubstr("permissions.p7s"));
+    EXPECT_THAT(error.what(), HasSubstr("permissions.p7s"));
+  }
+}
+
+TEST_P(Security, is_refused_with_a_discovery_server) {
+  Config config = secured(credentials("ours", "robot"));
+  config.discovery_server = "127.0.0.1:11811";
+  try {
+    Participant participant(config, "client");
+    FAIL() << "accepted";
+  } catch (const ConfigError& error) {
+    EXPECT_THAT(
+        error.what(),
+        ::testing::AllOf(HasSubstr("bus.discovery_server"), HasSubstr("bus.initial_peers")));
   }
 }
 

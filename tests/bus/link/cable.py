@@ -29,6 +29,15 @@ class Link:
         self.order("count\n")
         return [int(word) for word in self.process.stdout.readline().split()]
 
+    def pieces(self):
+        """Pieces of datagrams larger than a frame that came to either computer."""
+        total = 0
+        for network in self.networks:
+            lines = subprocess.run(["nsenter", f"--net={network}", "cat", "/proc/net/snmp"], stdout=subprocess.PIPE, check=True, text=True).stdout.splitlines()
+            names, values = (line.split() for line in lines if line.startswith("Ip:"))
+            total += int(values[names.index("ReasmReqds")])
+        return total
+
     def start(self, host, command, log, environment=None):
         """A process on the first (0) or second (1) computer; its environment is ours when none is given."""
         return subprocess.Popen(["nsenter", f"--net={self.networks[host]}"] + command, stdout=log, stderr=subprocess.STDOUT, env=environment)

@@ -2,6 +2,8 @@
 // Copyright the Trigpoint developers
 #include "domain_config.hpp"
 
+#include "trigpoint/base/config.hpp"
+
 #include "../network.hpp"
 
 #include <algorithm>
@@ -18,6 +20,9 @@ constexpr std::size_t kMostInterfaces = 4;  // Cyclone 0.10 cannot use more
 constexpr int kHighestIndex = 119;   // of a participant: above, ports belong to the next domain
 constexpr int kFirstIndexPort = 10;  // discovery of participant 0, above the domain's first
 constexpr std::int64_t kHeaders_bytes = 128;  // of RTPS in front of a fragment, generously
+// Around a fragment that is encrypted, and its payload once more. Cyclone does not count them, and
+// a datagram larger than it should be is sent in two pieces.
+constexpr std::int64_t kSecurityHeaders_bytes = 128;
 // Samples of a writer of which fragments are missing. When there are more, fragments of the newest
 // are thrown away, and a lossy link never catches up (with 2: 5 of 120 clouds at 1 % and 50 ms).
 constexpr int kMostRepaired = 16;
@@ -67,17 +72,20 @@ std::string interfaces(const Config& config) {
   return element("Interfaces", list);
 }
 
+std::int64_t fragment_bytes(const Config& config) {
+  const std::int64_t headers_bytes =
+      kHeaders_bytes + (config.security_folder.empty() ? 0 : kSecurityHeaders_bytes);
+  return std::min(config.datagram_bytes - headers_bytes, kLargestFragment_bytes);
+}
+
 std::string general(const Config& config) {
-  return element(
-      "General",
-      interfaces(config) +
-          // As Fast DDS does: data goes to each reader by itself, only discovery to all.
-          element("AllowMulticast", "spdp") +
-          element("MaxMessageSize", config.datagram_bytes, "B") +
-          element("MaxRexmitMessageSize", config.datagram_bytes, "B") +
-          element("FragmentSize",
-                  std::min(config.datagram_bytes - kHeaders_bytes, kLargestFragment_bytes),
-                  "B"));
+  return element("General",
+                 interfaces(config) +
+                     // As Fast DDS does: data goes to each reader by itself, only discovery to all.
+                     element("AllowMulticast", "spdp") +
+                     element("MaxMessageSize", config.datagram_bytes, "B") +
+                     element("MaxRexmitMessageSize", config.datagram_bytes, "B") +
+                     element("FragmentSize", fragment_bytes(config), "B"));
 }
 
 std::string peers(const Config& config) {
@@ -100,7 +108,7 @@ std::string peers(const Config& config) {
 
 std::string discovery(const Config& config) {
   if (!config.discovery_server.empty()) {
-    throw std::runtime_error(
+    throw ConfigError(
         "bus.discovery_server is '" + config.discovery_server +
         "', and Cyclone DDS knows no discovery server; name the computers in bus.initial_peers");
   }
@@ -139,7 +147,7 @@ std::string internal(const Config& config, const SocketBuffers& buffers) {
 /// Cyclone DDS shares memory through iceoryx, and only messages of fixed size.
 void refuse_shared_memory(const Config& config) {
   if (config.shared_memory) {
-    throw std::runtime_error(
+    throw ConfigError(
         "bus.shared_memory is true, and Cyclone DDS cannot do it: through its iceoryx daemon it "
         "shares messages of fixed size only, and points and odometry are not; leave it false, or "
         "take the programs that are built with Fast DDS");

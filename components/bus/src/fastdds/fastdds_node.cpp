@@ -9,6 +9,7 @@
 #include "endpoint.hpp"
 #include "fastdds_reader.hpp"
 #include "fastdds_writer.hpp"
+#include "handshake_room.hpp"
 #include "security.hpp"
 #include "transport.hpp"
 #include "wire_type.hpp"
@@ -53,6 +54,7 @@ FastNode::FastNode(const Config& config, const std::string& name, EventSink sink
   qos.user_data().data_vec({note.begin(), note.end()});
   set_transport(qos, config, buffers);
   set_security(qos, config);
+  const HandshakeRoom room(config);
   const int domain = domain_of(config);
   participant_ = factory->create_participant(
       static_cast<dds::DomainId_t>(domain), qos, this, dds::StatusMask::none());

@@ -2,6 +2,8 @@
 // Copyright the Trigpoint developers
 #include "transport.hpp"
 
+#include "trigpoint/base/config.hpp"
+
 #include "../network.hpp"
 #include "limited_transport.hpp"
 #include <fastdds/rtps/flowcontrol/FlowControllerDescriptor.hpp>
@@ -9,7 +11,6 @@
 #include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
 #include <fastrtps/utils/IPLocator.h>
 
-#include <algorithm>
 #include <memory>
 
 namespace trigpoint::bus::fastdds {
@@ -70,9 +71,22 @@ void add_peers(eprosima::fastdds::dds::DomainParticipantQos& qos, const Config& 
   peers.push_back(multicast);
 }
 
+/// Clients of Fast DDS before 2.10 do not do the handshake of DDS-Security with their server, nor
+/// does it tell them of each other then: all wait for ever, and nothing says so.
+void refuse_server_with_security(const Config& config) {
+  if (!config.security_folder.empty()) {
+    throw ConfigError(
+        "bus.discovery_server and bus.security_folder are both set, and Fast DDS 2.9 cannot have "
+        "them together: its discovery server knows no DDS-Security. Leave out the server and name "
+        "a computer that has a fixed address in bus.initial_peers of all; it finds the others "
+        "when they call");
+  }
+}
+
 /// All discovery goes through the server then: neither multicast nor peers are asked.
 void use_discovery_server(eprosima::fastdds::dds::DomainParticipantQos& qos, const Config& config) {
   namespace rtps = eprosima::fastrtps::rtps;
+  refuse_server_with_security(config);
   const Peer address = parse_peer(config.discovery_server, "bus.discovery_server");
   rtps::RemoteServerAttributes server;
   server.ReadguidPrefix(kDiscoveryServerPrefix);
@@ -98,21 +112,13 @@ void add_pacing(eprosima::fastdds::dds::DomainParticipantQos& qos, const Pacing&
   qos.flow_controllers().push_back(pacing);
 }
 
-/// Fast DDS cannot divide the messages of its handshake, with certificate and permissions: in
-/// smaller datagrams they are not sent, and nobody matches.
-std::int64_t largest_datagram_bytes(const Config& config) {
-  constexpr std::int64_t kHandshake_bytes = 5'880;  // four Ethernet frames
-  return config.security_folder.empty() ? config.datagram_bytes
-                                        : std::max(config.datagram_bytes, kHandshake_bytes);
-}
-
 }  // namespace
 
 void set_transport(eprosima::fastdds::dds::DomainParticipantQos& qos,
                    const Config& config,
                    const SocketBuffers& buffers) {
   auto udp = std::make_shared<Udp>();
-  udp->largest_sent_bytes = static_cast<std::uint32_t>(largest_datagram_bytes(config));
+  udp->largest_sent_bytes = static_cast<std::uint32_t>(config.datagram_bytes);
   udp->sendBufferSize = static_cast<std::uint32_t>(buffers.send_bytes);
   udp->receiveBufferSize = static_cast<std::uint32_t>(buffers.receive_bytes);
   udp->maxInitialPeersRange = kProcessesPerPeer;

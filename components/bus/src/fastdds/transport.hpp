@@ -13,7 +13,8 @@ namespace trigpoint::bus::fastdds {
 /// Name of the flow controller of bulk writers; there is one only when pacing_of() says so.
 inline constexpr char kPacing[] = "trigpoint_paced";
 
-/// Throws std::runtime_error when the interface or a peer is not known.
+/// Throws std::runtime_error when the interface or a peer is not known, ConfigError when a
+/// discovery server is to be asked with security.
 void set_transport(eprosima::fastdds::dds::DomainParticipantQos& qos,
                    const Config& config,
                    const SocketBuffers& buffers);
