@@ -146,6 +146,19 @@ TEST_P(SmoothMode, does_not_follow_a_wanderer_that_stands_still_while_the_alignm
   EXPECT_LT(drive.worst(0, 2), 0.4);
 }
 
+TEST_P(SmoothMode, does_not_follow_a_slow_creeper_while_the_alignment_is_young) {
+  settings.duration_s = 120.0;
+  settings.lie_enu_m = [this](double at_s) {
+    const double share = std::clamp((at_s - 25.0) / 40.0, 0.0, 1.0);
+    return Eigen::Vector3d(2.0 * share * aside);
+  };
+  LyingDrive drive(settings);
+  drive.run();
+  EXPECT_TRUE(drive.has_event("taken_back"));
+  EXPECT_FALSE(drive.has_event("realigned"));
+  EXPECT_LT(drive.worst(0, 1, 0.0, 65.0), 0.7);  // while it creeps
+}
+
 TEST_P(SmoothMode, is_back_in_5_s_when_gps_returns_after_an_outage_with_half_a_percent_of_drift) {
   settings.speed_mps = 1.2;
   settings.duration_s = 190.0;

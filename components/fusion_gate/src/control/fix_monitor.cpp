@@ -286,6 +286,7 @@ MonitorOutcome FixMonitor::judge(const Witness& witness, const LioStatus& lio) {
     outcome.change[k] = trusts_[k].judge(sighting, tests, lio);
     if (outcome.change[k] == Trust::Change::kDoubted) {
       outcome.taken_in_since_ns[k] = taken_in_since(sighting, lio, part);
+      crept_[k] = outcome.taken_in_since_ns[k].has_value();
       forget_since(outcome.taken_in_since_ns[k].value_or(sighting.stamp_ns), part);
     }
   }
@@ -376,8 +377,10 @@ std::optional<AlignmentSolution> FixMonitor::rival_of(const Sighting& sighting, 
               sighting.distance_m});
   const Sighting& first = doubt.stretch().front();
   const double agreed_s = doubt.agreed_s();
-  // Fixes that first moved unlike LIO are liars themselves; the end of a wrong fix is one jump.
-  const bool jumped = to_seconds(first.stamp_ns - doubt.since_ns()) <= kJump_s;
+  // Fixes that first moved unlike LIO are liars themselves, also those that crept so slowly that
+  // they agree with each other ever since; the end of a wrong fix is one jump.
+  const bool jumped =
+      !crept_[index_of(doubted)] && to_seconds(first.stamp_ns - doubt.since_ns()) <= kJump_s;
   const bool on_probation = jumped && confirmed_s_ < config_.smooth.probation_s;
   const bool outlives =
       doubted == Part::kLevel && agreed_s > kLongContradiction_s &&
@@ -402,6 +405,7 @@ void FixMonitor::begin_anew() {
   settling_.end();
   refused_.clear();
   confirmed_s_ = 0.0;
+  crept_ = {};
 }
 
 }  // namespace trigpoint::fusion_gate

@@ -145,6 +145,7 @@ class FixMonitor {
   Settling settling_;
   std::deque<Sighting> refused_;  // by the filter, since a fix was judged
   double confirmed_s_{0.0};       // time for which fixes confirmed the alignment
+  std::array<bool, 2> crept_{};   // by part: the doubt began with a displacement, not with a jump
 };
 
 }  // namespace trigpoint::fusion_gate
