@@ -35,9 +35,11 @@ constexpr double kSame_m = 1.0;
 constexpr double kSame_rad = 0.05;
 constexpr double kFoundOnPlane_m = 0.1;
 constexpr std::int64_t kMaxIterations = 20;
-constexpr double kPriorPosition_m = 0.7;
+constexpr int kRounds = 6;
+constexpr double kArrived_m = 0.02;
+constexpr double kPriorPosition_m = 3.0;
 constexpr double kPriorLevel_rad = 0.01;
-constexpr double kPriorYaw_rad = 0.05;
+constexpr double kPriorYaw_rad = 0.2;
 /// More, and the residuals have not the size that the matcher gives them.
 constexpr double kMostChi2 = 4.0;
 
@@ -189,15 +191,27 @@ std::optional<Pose> refined(const Hypothesis& h,
       position2 * Eigen::Matrix3d::Identity();
   covariance.block<3, 3>(error::kRotation, error::kRotation) = R.transpose() * turn * R;
   const Pose T_base_lidar{Eigen::Quaterniond::Identity(), scan.lidar_position_base_m};
-  ScanMatcher matcher(points_base, map, T_base_lidar, matching, workers);  // axes play no part
-  const UpdateResult result = iterated_update(prior,
-                                              covariance,
-                                              [&](const Pose& T) { return matcher.linearise(T); },
-                                              {kMaxIterations,
-                                               matching.converged_position_m,
-                                               matching.converged_rotation_rad,
-                                               static_cast<std::size_t>(matching.min_matches)});
-  return result.used ? std::optional(result.state.T_odom_base) : std::nullopt;
+  // What a scan is worth is judged where the matcher begins. From metres away that is little, and
+  // the prior holds on: so it begins again where it came to.
+  for (int round = 0; round < kRounds; ++round) {
+    ScanMatcher matcher(points_base, map, T_base_lidar, matching, workers);  // axes play no part
+    const UpdateResult result = iterated_update(prior,
+                                                covariance,
+                                                [&](const Pose& T) { return matcher.linearise(T); },
+                                                {kMaxIterations,
+                                                 matching.converged_position_m,
+                                                 matching.converged_rotation_rad,
+                                                 static_cast<std::size_t>(matching.min_matches)});
+    if (!result.used) {
+      return std::nullopt;
+    }
+    const double moved_m = (result.state.T_odom_base.p - prior.T_odom_base.p).norm();
+    prior.T_odom_base = result.state.T_odom_base;
+    if (moved_m < kArrived_m) {
+      break;
+    }
+  }
+  return prior.T_odom_base;
 }
 
 void judge(const Parts& parts,
