@@ -3,6 +3,7 @@
 // bringup/host keeps its computer's processes running, and bringup/collect lists what failed on
 // all.
 #include "run_command.hpp"
+#include "wait_until.hpp"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -10,10 +11,8 @@
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
-#include <functional>
 #include <map>
 #include <memory>
-#include <thread>
 
 namespace trigpoint {
 namespace {
@@ -30,15 +29,9 @@ std::string script(const std::string& name) {
   return std::string(TRIGPOINT_SOURCE_DIR) + "/bringup/" + name;
 }
 
-bool comes_true(const std::function<bool()>& condition) {
-  const auto until = std::chrono::steady_clock::now() + kForever;
-  while (!condition()) {
-    if (std::chrono::steady_clock::now() > until) {
-      return false;
-    }
-    std::this_thread::sleep_for(20ms);
-  }
-  return true;
+template <typename Condition>
+bool comes_true(Condition condition) {
+  return wait_until(condition, kForever);
 }
 
 class HostRestart : public ::testing::Test {

@@ -10,6 +10,7 @@
 #include "trigpoint/export/session.hpp"
 
 #include "run_command.hpp"
+#include "wait_until.hpp"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -44,11 +45,7 @@ void take_domain(int offset) {
 
 template <typename Condition>
 bool wait_until(Condition condition, std::chrono::seconds limit = 20s) {
-  const auto deadline = Clock::now() + limit;
-  while (!condition() && Clock::now() < deadline) {
-    std::this_thread::sleep_for(10ms);
-  }
-  return condition();
+  return tests::wait_until(condition, limit);
 }
 
 bool says(const Command& command, const std::string& text) {

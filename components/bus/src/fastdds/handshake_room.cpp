@@ -18,7 +18,8 @@ namespace {
 namespace dds = eprosima::fastdds::dds;
 
 constexpr char kHandshakeTopic[] = "DCPSParticipantStatelessMessage";
-/// A message of it has more than 4.4 kB with certificates of bringup/make-credentials, most of it permissions.
+/// A message of it has more than 4.4 kB with certificates of bringup/make-credentials, most of it
+/// permissions.
 constexpr std::uint32_t kLongestHandshake_bytes = 32'768;
 /// Security is for domains up to 230, so its ports are nobody's.
 constexpr dds::DomainId_t kDomainOfNobody = 232;
