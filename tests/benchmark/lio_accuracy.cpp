@@ -41,16 +41,17 @@ struct Score {
   double end_percent{kNaN};
   double driven_xy_m{kNaN};  ///< rms, aligned in yaw and position only
   double driven_z_m{kNaN};
-  double levelled_xy_m{kNaN};  ///< the same with odom levelled by the last estimate of gravity
+  double levelled_xy_m{kNaN};  ///< the same of what is published in map in mode lio
   double levelled_z_m{kNaN};
-  double tilt_deg{kNaN};  ///< left after that
+  double tilt_deg{kNaN};  ///< of that
   double refused{0.0};
   double scan_ms{kNaN};  ///< CPU time
 
   double error_m() const { return std::hypot(levelled_xy_m, levelled_z_m); }
 };
 
-/// One mapper with its trajectory in odom.
+/// One mapper with its trajectory in odom, and as fusion/odometry tells it without any GPS: each
+/// step turned level by the gravity that was known then, for odom tilts about the robot.
 struct Run {
   Run(const lio_mapper::Config& config, const RobotConfig& robot) : mapper(config, robot) {}
 
@@ -60,12 +61,23 @@ struct Run {
     const lio_mapper::Output output = feed(mapper);
     spent_ms += cpu_ms() - before_ms;
     for (const lio_mapper::ScanResult& scan : output.scans) {
-      trajectory.push_back({scan.odometry.stamp_ns, scan.odometry.T_frame_child});
+      const Pose& T_odom_base = scan.odometry.T_frame_child;
+      YawPose level;
+      level.tilt_rad = scan.status.T_map_odom.tilt_rad;
+      const Pose turn = level.pose();
+      const Eigen::Vector3d step_odom_m =
+          trajectory.empty() ? T_odom_base.p : T_odom_base.p - trajectory.back().pose.p;
+      const Eigen::Vector3d from_m =
+          levelled.empty() ? Eigen::Vector3d::Zero() : levelled.back().pose.p;
+      trajectory.push_back({scan.odometry.stamp_ns, T_odom_base});
+      levelled.push_back(
+          {scan.odometry.stamp_ns, {turn.q * T_odom_base.q, from_m + turn.q * step_odom_m}});
     }
   }
 
   lio_mapper::LioMapper mapper;
   evaluation::Trajectory trajectory;
+  evaluation::Trajectory levelled;
   double spent_ms{0.0};
 };
 
@@ -83,12 +95,18 @@ std::vector<PosePair> aligned(const std::vector<PosePair>& pairs) {
   return T ? evaluation::place_estimates(*T, pairs) : pairs;
 }
 
-Score score_of(const Run& run, const simulator::Truth& truth) {
-  Score score;
+std::vector<PosePair> pairs_of(const evaluation::Trajectory& trajectory,
+                               const simulator::Truth& truth) {
   std::vector<PosePair> pairs;
-  for (const auto& [stamp_ns, pose] : run.trajectory) {
+  for (const auto& [stamp_ns, pose] : trajectory) {
     pairs.push_back({stamp_ns, pose, truth.at(stamp_ns).T_map_base});
   }
+  return pairs;
+}
+
+Score score_of(const Run& run, const simulator::Truth& truth) {
+  Score score;
+  const auto pairs = pairs_of(run.trajectory, truth);
   const LioStatus status = run.mapper.status();
   score.refused = static_cast<double>(status.scans_received - status.scans_used);
   if (pairs.size() < 2) {
@@ -101,9 +119,7 @@ Score score_of(const Run& run, const simulator::Truth& truth) {
   const auto driven = evaluation::absolute_error(aligned(pairs));
   score.driven_xy_m = driven.horizontal_m.rmse;
   score.driven_z_m = driven.axes_m[2].rmse;
-  YawPose level;
-  level.tilt_rad = status.T_map_odom.tilt_rad;
-  const auto levelled_pairs = aligned(evaluation::place_estimates(level.pose(), pairs));
+  const auto levelled_pairs = aligned(pairs_of(run.levelled, truth));
   const auto levelled = evaluation::absolute_error(levelled_pairs);
   score.levelled_xy_m = levelled.horizontal_m.rmse;
   score.levelled_z_m = levelled.axes_m[2].rmse;
