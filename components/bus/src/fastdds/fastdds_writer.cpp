@@ -15,9 +15,9 @@ namespace dds = eprosima::fastdds::dds;
 
 namespace {
 
-dds::DataWriterQos writer_qos(const FastNode& node, const Qos& qos) {
+dds::DataWriterQos writer_qos(const FastNode& node, const Qos& qos, const backend::TypeOps& type) {
   dds::DataWriterQos result;
-  set_policies(result, qos);
+  set_policies(result, qos, type);
   result.reliable_writer_qos().times.heartbeatPeriod =
       eprosima::fastrtps::Duration_t(node.config().heartbeat_s);
   // What is missing is sent at once: many short repairs follow each other on a long way.
@@ -39,7 +39,7 @@ FastWriter::FastWriter(FastNode& node,
                        PublisherEvents events)
     : node_(node), type_(type), events_(std::move(events)) {
   writer_ = node.publisher().create_datawriter(
-      topic, writer_qos(node, qos), this, dds::StatusMask::all());
+      topic, writer_qos(node, qos, type), this, dds::StatusMask::all());
   if (writer_ == nullptr) {
     throw std::runtime_error("Fast DDS cannot create a writer on " + topic->get_name());
   }
