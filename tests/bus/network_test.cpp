@@ -11,6 +11,8 @@
 
 #include <atomic>
 #include <csignal>
+#include <cstdlib>
+#include <iostream>
 #include <thread>
 
 namespace trigpoint::bus {
@@ -139,6 +141,53 @@ TEST(SmallBuffers, still_carry_every_two_megabyte_cloud_and_imu_sample) {
   EXPECT_TRUE(clouds.wait_for(kClouds)) << clouds.size() << " of " << kClouds << " clouds arrived";
   EXPECT_EQ(damaged, 0U);
   EXPECT_EQ(imu_heard, imu_sent);
+}
+
+TEST(PacedWriter, goes_on_when_readers_leave_in_the_middle_of_a_cloud) {
+  constexpr int kLeaving = 60;
+  Config config = own_domain();
+  config.datagram_bytes = 1472;
+  config.heartbeat_s = 0.01;
+  config.bulk_bytes_per_s = 1'000'000'000;
+  Config lossy = config;  // much is lost, so that repairs are under way when the reader leaves
+  lossy.socket_buffer_bytes = 131'072;
+  Participant sensors(config, "sensors");
+  Participant mapper(config, "mapper");
+  Participant other(lossy, "other");
+  Publisher clouds(sensors, topics::points);
+  Collected<std::uint32_t> staying_heard;
+  const Subscription<sensor_msgs::msg::PointCloud2> staying(
+      mapper, topics::points, [&](const auto& cloud, const MessageInfo&) {
+        staying_heard.add(cloud.height());
+      });
+  std::atomic<bool> ended{false};
+  std::atomic<int> written{0};
+  std::thread writing([&] {
+    for (auto due = std::chrono::steady_clock::now(); !ended; due += 20ms) {
+      std::this_thread::sleep_until(due);
+      clouds.publish(to_message(two_megabytes(0)));
+      ++written;
+    }
+  });
+  for (int i = 0; i < kLeaving; ++i) {
+    {
+      const Subscription<sensor_msgs::msg::PointCloud2> leaving(
+          other, topics::points, [](const auto&, const MessageInfo&) {});
+      std::this_thread::sleep_for(std::chrono::milliseconds(200 + 7 * i % 20));
+    }
+    const int before = written;
+    const auto deadline = std::chrono::steady_clock::now() + kForever;
+    while (written < before + 2) {
+      if (std::chrono::steady_clock::now() > deadline) {
+        std::cerr << "the writer hangs since reader " << i << " left, and cannot be destroyed\n";
+        std::abort();
+      }
+      std::this_thread::sleep_for(10ms);
+    }
+  }
+  ended = true;
+  writing.join();
+  EXPECT_GT(staying_heard.size(), 0U);
 }
 
 /// Files in /dev/shm that this process has mapped.

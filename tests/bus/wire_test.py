@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the Trigpoint developers
 """What the bus announces and sends, read from a capture by tshark's RTPS dissector, is what ROS 2 nodes match with:
-names of topics and types, QoS as in the table of idl/README.md, and plain little-endian CDR.
+names of topics and types, QoS as in the table of idl/README.md, type hashes, and plain little-endian CDR.
 
     wire_test.py BUS_PEER          one vendor's bus_peer against itself
     wire_test.py --table BUS_PEER  prints what was announced
@@ -19,6 +19,10 @@ import tempfile
 import time
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+sys.dont_write_bytecode = True
+import type_hash_test  # noqa: E402
+
 SKIPPED = 77
 LISTEN_S = 4.0  # discovery takes 0.1 s here, and every example is sent again each 20 ms
 LONGEST_WAIT_S = 20.0
@@ -155,13 +159,27 @@ def faults_of_data(data, documented):
             yield f"{topic}: samples in {sorted(heard.get(topic, ['no encapsulation: none was seen']))}, not in CDR_LE"
 
 
+def user_data(announced):
+    """As far as tshark prints it: 36 bytes."""
+    match = re.search(r"userData: ([0-9a-f]+)", announced.get("PID_USER_DATA", ""))
+    return bytes.fromhex(match.group(1)).decode() if match else ""
+
+
 def faults_of_participants(data):
     """ROS 2 reads USER_DATA as key=value; with semicolons, and wants an enclave there."""
-    told = [re.search(r"userData: ([0-9a-f]+)", parameters(text).get("PID_USER_DATA", ""))
-            for text in data if re.search(r"PID_PARTICIPANT_LEASE_DURATION", text)]
-    notes = {bytes.fromhex(match.group(1)).decode() for match in told if match}
+    notes = {user_data(parameters(text)) for text in data if "PID_PARTICIPANT_LEASE_DURATION" in text} - {""}
     if not notes or not all(re.fullmatch(r"enclave=/;(\w+=\w+;)*", note) for note in notes):
         yield f"USER_DATA of participants: {sorted(notes)}"
+
+
+def faults_of_hashes(found):
+    """What ROS 2 since Iron shows as the type's hash, and Cyclone's layer warns of where it is not there."""
+    hashes = type_hash_test.announced()
+    for (kind, topic), announced in sorted(found.items()):
+        wanted = f"typehash=RIHS01_{hashes.get(value(announced, 'PID_TYPE_NAME', 'typeName'))};"
+        size = int(value(announced, "PID_USER_DATA", "sequenceSize", "0"))
+        if size != len(wanted) or not wanted.startswith(user_data(announced)):
+            yield f"{kind} {topic}: USER_DATA of {size} bytes beginning with {user_data(announced)!r}, not {wanted!r}"
 
 
 def main(peer, as_table):
@@ -178,12 +196,11 @@ def main(peer, as_table):
     documented = documented_topics()
     if as_table:
         for (kind, topic), announced in sorted(found.items()):
-            print(kind.lower(), topic, qos_of(kind, announced), "user data:", value(announced, "PID_USER_DATA", "userData", "none"))
-    faults = [*differences(found, documented), *faults_of_data(data, documented), *faults_of_participants(data)]
+            print(kind.lower(), topic, qos_of(kind, announced), "user data:", user_data(announced))
+    faults = [*differences(found, documented), *faults_of_data(data, documented), *faults_of_participants(data), *faults_of_hashes(found)]
     depths = sum(qos_of(kind, announced)["depth"] is not None for (kind, _), announced in found.items())
-    hashes = sum("userData:" in announced.get("PID_USER_DATA", "") for announced in found.values())
     print("\n".join(faults) or f"{len(found)} endpoints on {len(documented)} topics announced as in idl/README.md "
-          f"(history depth announced by {depths}, user data by {hashes}); samples of all topics in CDR_LE")
+          f"(history depth announced by {depths}), with the hashes of their types; samples of all topics in CDR_LE")
     return 1 if faults else 0
 
 

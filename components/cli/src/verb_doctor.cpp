@@ -6,6 +6,7 @@
 #include "bus_survey.hpp"
 #include "doctor_findings.hpp"
 #include "gps_filter_check.hpp"
+#include "incomplete_datagrams.hpp"
 #include "input.hpp"
 #include "measurement_checks.hpp"
 #include "number_checks.hpp"
@@ -17,6 +18,7 @@
 #include <iomanip>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <variant>
 
 namespace trigpoint::cli {
@@ -58,12 +60,19 @@ void tell_socket_buffer_limit() {
   }
 }
 
+/// Since `failed_before` was asked for; 1 when there were some.
+int tell_incomplete_datagrams(std::optional<std::int64_t> failed_before) {
+  const std::string advice = reassembly_advice(failed_before, failed_reassemblies());
+  return advice.empty() ? 0 : tell("the network", {advice});
+}
+
 int examine_bus(const DoctorOptions& options) {
   const shell::EventLog log("doctor");
   const SystemConfig config = load_config_of(options.input);
   std::cout << "DDS domain " << bus::domain_of(config.bus) << ", listening for " << options.seconds
             << " s\n";
   std::vector<bus::DiscoveredEndpoint> endpoints;
+  const auto failed_before = failed_reassemblies();
   const auto surveys = recording::survey_bus(
       {config.bus,
        recording::known_topics(config.cores.robot),
@@ -93,6 +102,7 @@ int examine_bus(const DoctorOptions& options) {
     std::cout << "  " << line << "\n";
   }
   tell_socket_buffer_limit();
+  wrong |= tell_incomplete_datagrams(failed_before);
   if (!anybody) {
     std::cerr << "trigpoint doctor: nobody writes any of these topics; is ROS_DOMAIN_ID the same "
                  "everywhere?\n";

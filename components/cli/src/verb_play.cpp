@@ -16,6 +16,7 @@
 #include "verbs.hpp"
 
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -30,6 +31,7 @@ struct PlayVerbOptions {
   std::string session;
   std::string rate{"max"};
   int wait_s{10};
+  double settle_s{0.0};
   bool check{false};            ///< only look whether a whole run could begin
   bool allow_others{false};     ///< who write the same topics
   bool allow_no_reader{false};  ///< play to nobody
@@ -156,6 +158,7 @@ int run(const PlayVerbOptions& options) {
   play.rate = rate;
   play.allow_no_reader = options.allow_no_reader;
   play.wait_for_peers = std::chrono::seconds(options.wait_s);
+  play.settle = std::chrono::milliseconds(std::lround(1e3 * options.settle_s));
   play.progress = [&](double share) { progress(share); };
   play.on_entry = [&](const recording::LogEntry& entry) { session.on_entry(entry); };
   play.on_event = [&](const Event& event) { log(event); };
@@ -190,6 +193,14 @@ void add_play(CLI::App& app, Chosen& chosen) {
                    "wait this long for the three processes before the first message, s")
       ->capture_default_str()
       ->check(whole_number());
+  verb->add_option(
+          "--settle",
+          options->settle_s,
+          "and then so long again, until those on other computers have heard of the player "
+          "too: else they may miss the first messages, s")
+      ->capture_default_str()
+      ->check(zero_or_more())
+      ->check(CLI::Range(0.0, 60.0));
   verb->add_flag("--check",
                  options->check,
                  "play nothing: tell whether arguments, configuration and log are right and nobody "

@@ -97,6 +97,10 @@ class Player {
                std::to_string(imu_.matched()) + " (2), gps/fix " +
                std::to_string(fixes_.matched()) + " (2); playing all the same");
     }
+    const auto settled = WallClock::now() + options_.settle;
+    while (WallClock::now() < settled && !stop_requested()) {
+      std::this_thread::sleep_for(20ms);
+    }
     pace_.begin();
   }
 

@@ -24,6 +24,9 @@ struct PlayOptions {
   double rate{0.0};
   /// Waits this long for a mapper, a filter and a gate before the first message.
   std::chrono::seconds wait_for_peers{10};
+  /// And then so long again, so that they know us too: a reader on another computer that learns of
+  /// a writer late never asks for what went before.
+  std::chrono::milliseconds settle{0};
   bool allow_no_reader{false};  ///< play on when nobody at all listens
   /// An answer that does not come within this time is given up, counted and told.
   std::chrono::milliseconds patience{3000};

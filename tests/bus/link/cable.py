@@ -29,14 +29,20 @@ class Link:
         self.order("count\n")
         return [int(word) for word in self.process.stdout.readline().split()]
 
+    def kernel_count(self, host, protocol, name):
+        """A counter of /proc/net/snmp on the first (0) or second (1) computer."""
+        command = ["nsenter", f"--net={self.networks[host]}", "cat", "/proc/net/snmp"]
+        lines = subprocess.run(command, stdout=subprocess.PIPE, check=True, text=True).stdout.splitlines()
+        names, values = (line.split() for line in lines if line.startswith(protocol + ":"))
+        return int(values[names.index(name)])
+
     def pieces(self):
         """Pieces of datagrams larger than a frame that came to either computer."""
-        total = 0
-        for network in self.networks:
-            lines = subprocess.run(["nsenter", f"--net={network}", "cat", "/proc/net/snmp"], stdout=subprocess.PIPE, check=True, text=True).stdout.splitlines()
-            names, values = (line.split() for line in lines if line.startswith("Ip:"))
-            total += int(values[names.index("ReasmReqds")])
-        return total
+        return sum(self.kernel_count(host, "Ip", "ReasmReqds") for host in range(len(self.networks)))
+
+    def udp_received(self, host):
+        """Datagrams that processes on that computer have received."""
+        return self.kernel_count(host, "Udp", "InDatagrams")
 
     def start(self, host, command, log, environment=None):
         """A process on the first (0) or second (1) computer; its environment is ours when none is given."""

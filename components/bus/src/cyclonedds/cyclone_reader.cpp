@@ -66,7 +66,7 @@ dds_entity_t CycloneReader::create() {
       listener.get(), [](dds_entity_t, dds_requested_incompatible_qos_status_t status, void* self) {
         static_cast<CycloneReader*>(self)->on_incompatible_qos(status.last_policy_id);
       });
-  const QosPointer policies = make_qos(qos_);
+  const QosPointer policies = make_qos(qos_, type_);
   const OwnCall call;
   return checked(
       dds_create_reader(node_.participant(), topic_.entity, policies.get(), listener.get()),

@@ -11,8 +11,8 @@ namespace trigpoint::bus::cyclonedds {
 
 namespace {
 
-QosPointer writer_qos(const Qos& qos) {
-  QosPointer result = make_qos(qos);
+QosPointer writer_qos(const Qos& qos, const backend::TypeOps& type) {
+  QosPointer result = make_qos(qos, type);
   dds_qset_writer_data_lifecycle(result.get(),
                                  false);  // a topic without key has nothing to dispose
   if (qos.durability == Durability::kTransientLocal) {
@@ -50,7 +50,7 @@ CycloneWriter::CycloneWriter(CycloneNode& node,
       listener.get(), [](dds_entity_t, dds_offered_incompatible_qos_status_t status, void* self) {
         static_cast<CycloneWriter*>(self)->tell_incompatible(status.last_policy_id);
       });
-  const QosPointer policies = writer_qos(qos);
+  const QosPointer policies = writer_qos(qos, type);
   *topic_.is_written_here = true;
   writer_ =
       checked(dds_create_writer(node.participant(), topic.entity, policies.get(), listener.get()),

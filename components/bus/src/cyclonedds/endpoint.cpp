@@ -3,12 +3,13 @@
 #include "endpoint.hpp"
 
 #include "../message_info.hpp"
+#include "../type_hash.hpp"
 
 #include <stdexcept>
 
 namespace trigpoint::bus::cyclonedds {
 
-QosPointer make_qos(const Qos& qos) {
+QosPointer make_qos(const Qos& qos, const backend::TypeOps& type) {
   QosPointer result(dds_create_qos());
   constexpr dds_duration_t kLongestBlocking = DDS_MSECS(100);
   dds_qset_reliability(result.get(),
@@ -21,6 +22,8 @@ QosPointer make_qos(const Qos& qos) {
   dds_qset_history(result.get(), DDS_HISTORY_KEEP_LAST, qos.depth);
   const dds_data_representation_id_t representation = DDS_DATA_REPRESENTATION_XCDR1;
   dds_qset_data_representation(result.get(), 1, &representation);
+  const std::string note = type_hash_note(type.dds_name);
+  dds_qset_userdata(result.get(), note.data(), note.size());
   return result;
 }
 

@@ -3,6 +3,7 @@
 // What writers and readers have in common.
 #pragma once
 
+#include "trigpoint/bus/backend.hpp"
 #include "trigpoint/bus/qos.hpp"
 
 #include <dds/dds.h>
@@ -24,7 +25,7 @@ using QosPointer = std::unique_ptr<dds_qos_t, QosDeleter>;
 using ListenerPointer = std::unique_ptr<dds_listener_t, ListenerDeleter>;
 
 /// The policies that writers and readers both have.
-QosPointer make_qos(const Qos& qos);
+QosPointer make_qos(const Qos& qos, const backend::TypeOps& type);
 
 /// 32 hexadecimal digits.
 std::string guid_text(const dds_guid_t& guid);

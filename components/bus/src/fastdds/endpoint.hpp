@@ -3,8 +3,10 @@
 // What writers and readers have in common.
 #pragma once
 
+#include "trigpoint/bus/backend.hpp"
 #include "trigpoint/bus/qos.hpp"
 
+#include "../type_hash.hpp"
 #include <fastdds/dds/core/policy/QosPolicies.hpp>
 #include <fastdds/rtps/common/Guid.h>
 #include <fastdds/rtps/resources/ResourceManagement.h>
@@ -16,8 +18,10 @@ namespace trigpoint::bus::fastdds {
 
 /// Sets the policies that DataWriterQos and DataReaderQos both have.
 template <class EndpointQos>
-void set_policies(EndpointQos& endpoint, const Qos& qos) {
+void set_policies(EndpointQos& endpoint, const Qos& qos, const backend::TypeOps& type) {
   namespace dds = eprosima::fastdds::dds;
+  const std::string note = type_hash_note(type.dds_name);
+  endpoint.user_data().data_vec({note.begin(), note.end()});
   endpoint.reliability().kind = qos.reliability == Reliability::kReliable
                                     ? dds::RELIABLE_RELIABILITY_QOS
                                     : dds::BEST_EFFORT_RELIABILITY_QOS;

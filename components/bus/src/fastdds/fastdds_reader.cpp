@@ -42,7 +42,7 @@ FastReader::~FastReader() {
 
 dds::DataReader* FastReader::create(const Qos& qos) {
   dds::DataReaderQos reader_qos;
-  set_policies(reader_qos, qos);
+  set_policies(reader_qos, qos, type_);
   dds::DataReader* reader =
       node_.subscriber().create_datareader(topic_, reader_qos, this, dds::StatusMask::all());
   if (reader == nullptr) {

@@ -15,9 +15,9 @@ namespace dds = eprosima::fastdds::dds;
 
 namespace {
 
-dds::DataWriterQos writer_qos(const FastNode& node, const Qos& qos) {
+dds::DataWriterQos writer_qos(const FastNode& node, const Qos& qos, const backend::TypeOps& type) {
   dds::DataWriterQos result;
-  set_policies(result, qos);
+  set_policies(result, qos, type);
   result.reliable_writer_qos().times.heartbeatPeriod =
       eprosima::fastrtps::Duration_t(node.config().heartbeat_s);
   // What is missing is sent at once: many short repairs follow each other on a long way.
@@ -30,6 +30,17 @@ dds::DataWriterQos writer_qos(const FastNode& node, const Qos& qos) {
   return result;
 }
 
+/// When a reader goes, Fast DDS 2.9 removes from a volatile writer's history what only that one had
+/// not acknowledged, and holds the writer's list of readers meanwhile. If some of it is being
+/// repaired it waits for the flow controller, whose thread waits for that list: the process hangs
+/// for ever (Fast DDS #3468, #5432). So what is acknowledged stays until `depth` newer samples are
+/// there. What is announced and what late joiners get was settled when the writer was made; from
+/// then on only that removal asks for the durability, and no function may change it.
+void keep_what_is_acknowledged(dds::DataWriter& writer) {
+  const_cast<dds::DataWriterQos&>(writer.get_qos()).durability().kind =
+      dds::TRANSIENT_LOCAL_DURABILITY_QOS;
+}
+
 }  // namespace
 
 FastWriter::FastWriter(FastNode& node,
@@ -39,9 +50,13 @@ FastWriter::FastWriter(FastNode& node,
                        PublisherEvents events)
     : node_(node), type_(type), events_(std::move(events)) {
   writer_ = node.publisher().create_datawriter(
-      topic, writer_qos(node, qos), this, dds::StatusMask::all());
+      topic, writer_qos(node, qos, type), this, dds::StatusMask::all());
   if (writer_ == nullptr) {
     throw std::runtime_error("Fast DDS cannot create a writer on " + topic->get_name());
+  }
+  // Unpaced clouds are for one computer, where nothing is repaired: their memory is better reused.
+  if (!qos.bulk || node.is_paced()) {
+    keep_what_is_acknowledged(*writer_);
   }
 }
 
@@ -51,6 +66,10 @@ FastWriter::~FastWriter() {
     closed_ = true;
   }
   writer_->set_listener(nullptr);
+  // Else Fast DDS 2.9 takes its samples away one by one while its heartbeat goes through them,
+  // which then counts missing ones for ever.
+  std::size_t removed = 0;
+  writer_->clear_history(&removed);
   node_.publisher().delete_datawriter(writer_);
 }
 

@@ -3,6 +3,8 @@
 #include "limited_transport.hpp"
 
 #include "../rtps_limits.hpp"
+#include "channels.hpp"
+#include <fastdds/rtps/common/LocatorList.hpp>
 #include <fastdds/rtps/network/SenderResource.h>
 #include <fastdds/rtps/transport/ChainingTransport.h>
 #include <fastdds/rtps/transport/TransportReceiverInterface.h>
@@ -34,7 +36,19 @@ class LimitedTransport : public rtps::ChainingTransport {
             LocatorsIterator* begin,
             LocatorsIterator* end,
             const std::chrono::steady_clock::time_point& timeout) override {
-    return low_level->send(bytes, size, begin, end, timeout);
+    const Reach reach = channels_.reach_of(*low_level);
+    if (reach == Reach::kAll) {
+      return low_level->send(bytes, size, begin, end, timeout);
+    }
+    rtps::LocatorList served;
+    for (LocatorsIterator& to = *begin; to != *end; ++to) {
+      if (serves(reach, *to)) {
+        served.push_back(*to);
+      }
+    }
+    rtps::Locators first(served.begin());
+    rtps::Locators after(served.end());
+    return served.empty() || low_level->send(bytes, size, &first, &after, timeout);
   }
 
   void receive(rtps::TransportReceiverInterface* next,
@@ -49,6 +63,7 @@ class LimitedTransport : public rtps::ChainingTransport {
 
  private:
   std::shared_ptr<rtps::TransportDescriptorInterface> low_level_descriptor_;
+  Channels channels_;
 };
 
 struct LimitedDescriptor : rtps::ChainingTransportDescriptor {

@@ -9,7 +9,8 @@
 namespace trigpoint::bus::fastdds {
 
 /// The same transport, which drops datagrams that announce a sample above kLargestMessage_bytes:
-/// Fast DDS 2.9 makes room for it, and touches all of it, at the first fragment.
+/// Fast DDS 2.9 makes room for it, and touches all of it, at the first fragment. With an interface
+/// named it sends to every destination once, not from every socket (channels.hpp).
 std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> limited(
     std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> transport);
 
