@@ -414,7 +414,10 @@ Output LioMapper::on_decoded_cloud(DecodedCloud cloud) {
     impl_->refuse_sweep(refusal->code, content.stamp_ns, refusal->text, output);
     return output;
   }
-  impl_->queue(std::move(std::get<Sweep>(content.sweep)), output);
+  Sweep& sweep = std::get<Sweep>(content.sweep);
+  if (!impl_->refuse_doubtful(sweep, content.stamp_ns, output)) {
+    impl_->queue(std::move(sweep), output);
+  }
   impl_->process_what_is_covered(output);
   return output;
 }

@@ -6,6 +6,7 @@
 #include "trigpoint/lio_mapper/lio_mapper.hpp"
 
 #include "calibration_report.hpp"
+#include "clock_steps.hpp"
 #include "imu_buffer.hpp"
 #include "imu_intake.hpp"
 #include "imu_rate_odometry.hpp"
@@ -24,8 +25,8 @@
 
 namespace trigpoint::lio_mapper {
 
-/// lio_mapper.cpp has the way of a sweep, mapper_recovery.cpp what happens at restarts and lost
-/// tracks, mapper_past.cpp what the correction of the past needs.
+/// lio_mapper.cpp has the way of a sweep, mapper_recovery.cpp what happens at restarts, lost
+/// tracks and clocks that are set, mapper_past.cpp what the correction of the past needs.
 struct LioMapper::Impl {
   /// `checked` contradicts itself nowhere.
   Impl(const Config& checked, const RobotConfig& robot)
@@ -44,6 +45,7 @@ struct LioMapper::Impl {
     }
   }
 
+  bool refuse_doubtful(Sweep& sweep, Nanoseconds cloud_stamp_ns, Output& output);
   void queue(Sweep sweep, Output& output);
   void process_what_is_covered(Output& output);
   void start_when_possible(Output& output);
@@ -75,6 +77,7 @@ struct LioMapper::Impl {
   CloudDecoder decoder;
   ImuIntake intake;
   ImuBuffer imu;
+  ClockSteps clock_steps;
   std::deque<Sweep> sweeps;
   std::optional<PastRecord> past;  ///< when it is kept
   std::optional<ScanFilter> filter;

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
+#include "trigpoint/base/sentence.hpp"
+
 #include "checkpoint_of.hpp"
 #include "mapper_impl.hpp"
 
@@ -114,6 +116,41 @@ std::optional<Checkpoint> LioMapper::checkpoint() const {
 
 std::vector<StoredRow> LioMapper::take_rows() {
   return std::exchange(impl_->rows_decided, {});
+}
+
+/// Puts the sweep's stamps right when the LiDAR's clock was set while it ran. A sweep whose stamp
+/// nothing explains yet would lay its points where the robot was not: refused.
+bool LioMapper::Impl::refuse_doubtful(Sweep& sweep, Nanoseconds cloud_stamp_ns, Output& output) {
+  if (imu.empty()) {
+    return false;
+  }
+  const auto verdict = clock_steps.look(cloud_stamp_ns, sweep.end_ns, imu.newest_ns());
+  sweep.begin_ns += clock_steps.offset_ns();
+  sweep.end_ns += clock_steps.offset_ns();
+  const double step_s = to_seconds(clock_steps.step_ns());
+  if (verdict == ClockSteps::Verdict::kDoubtful && sweep.end_ns > newest_sweep_ns) {
+    refuse_sweep("stamp_in_doubt",
+                 sweep.end_ns,
+                 sentence("refused a sweep whose stamp is %+.3f s off, by the scanner's rhythm and "
+                          "by when it came, expected one of the clock so far",
+                          step_s),
+                 output);
+    return true;
+  }
+  if (verdict == ClockSteps::Verdict::kStepped) {
+    sweep.clock_sigma_s = clock_steps.sigma_s();
+    output.events.push_back(
+        {Severity::kWarning,
+         sweep.end_ns,
+         "lidar_clock_stepped",
+         sentence(
+             "the LiDAR's clock was set by %+.4f s while it ran (sigma %.4f s): its stamps are "
+             "corrected by %+.4f s from here on; synchronise it before driving",
+             step_s,
+             clock_steps.sigma_s(),
+             to_seconds(clock_steps.offset_ns()))});
+  }
+  return false;
 }
 
 }  // namespace trigpoint::lio_mapper

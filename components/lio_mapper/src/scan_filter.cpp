@@ -174,6 +174,17 @@ void ScanFilter::add_drift(Prediction& prediction) {
   add_drift_noise(rate, moved_m, prediction.state, aligned_, prediction.covariance);
 }
 
+/// A sweep whose time is uncertain against that of the sweeps before was taken that much farther
+/// along the way.
+void ScanFilter::add_clock_noise(const Sweep& sweep, Prediction& prediction) {
+  if (sweep.clock_sigma_s > 0.0) {
+    Vector6d way = Vector6d::Zero();  // in a second
+    way << prediction.state.v_odom_mps, prediction.path.back().angular_radps;
+    way *= sweep.clock_sigma_s;
+    prediction.covariance.topLeftCorner<6, 6>() += way * way.transpose();
+  }
+}
+
 UpdateResult ScanFilter::update(const Prediction& prediction, ScanMatcher& matcher) {
   const IterationLimits limits = limits_of(config_.matching);
   const auto timed = [&](const auto& linearise) {
@@ -311,6 +322,7 @@ ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu, const 
   begin(Stage::kPredict);
   Prediction prediction = predict(sweep, imu);
   add_drift(prediction);
+  add_clock_noise(sweep, prediction);
   add_blind_tilt_noise(config_.drift,
                        to_seconds(sweep.end_ns - stamp_ns()),
                        blind_,

@@ -132,6 +132,7 @@ class ScanFilter {
 
   Prediction predict(const Sweep& sweep, const ImuBuffer& imu) const;
   void add_drift(Prediction& prediction);
+  static void add_clock_noise(const Sweep& sweep, Prediction& prediction);
   void begin(Stage stage) const;
   /// The prediction conditioned on the pose that a search found; false when it found none.
   bool search(const PoseSearch& look, const PointCloud& thinned_base, Prediction& prediction) const;

@@ -24,8 +24,9 @@ struct TimedPoint {
 
 /// A decoded sweep: finite points within the range limits, each with its own time.
 struct Sweep {
-  Nanoseconds begin_ns{0};  ///< time of the first point
-  Nanoseconds end_ns{0};    ///< time of the last point
+  Nanoseconds begin_ns{0};    ///< time of the first point
+  Nanoseconds end_ns{0};      ///< time of the last point
+  double clock_sigma_s{0.0};  ///< of both, besides what they have in common with earlier sweeps
   std::vector<TimedPoint> points;
   std::size_t points_received{0};
   std::size_t points_refused{0};  ///< not finite or out of range

@@ -290,6 +290,26 @@ TEST(LioMapper, goes_on_when_inputs_are_spoilt_and_counts_them) {
   EXPECT_LT(run.error(room, run.scans.back().odometry).norm(), 0.02);
 }
 
+/// A scan under a stamp of another time lies where the robot was not, and so does all that it adds
+/// to the map: 0.5 m at this speed.
+TEST(LioMapper, corrects_stamps_while_the_lidars_clock_is_set_back_and_again) {
+  constexpr double kTolerance_m = 0.02;
+  const RoomDrive room;
+  Drive run;
+  run.on_cloud = [](int sweep, PointCloudMessage& cloud) {
+    cloud.stamp_ns -= sweep >= 60 && sweep < 80 ? 250'000'000 : 0;
+    return true;
+  };
+  run.drive(room, 0, 120);
+  EXPECT_EQ(refused(run.mapper.status(), "stamp_not_after_previous"), 1U);
+  EXPECT_EQ(refused(run.mapper.status(), "stamp_in_doubt"), 1U);
+  EXPECT_TRUE(run.said("lidar_clock_stepped"));
+  EXPECT_GE(run.mapper.status().scans_used, 117U);
+  for (const ScanResult& scan : run.scans) {
+    EXPECT_LT(run.error(room, scan.odometry).norm(), kTolerance_m);
+  }
+}
+
 TEST(LioMapper, bridges_an_imu_gap_and_refuses_sweeps_that_a_long_one_touches) {
   const RoomDrive room;
   Drive run;
