@@ -376,6 +376,8 @@ void InsTracker::change_frame(InsTrack& track,
   track.aiding.prior_yaw_map_relative_rad += std::atan2(R_new_old(1, 0), R_new_old(0, 0));
   for (Contradiction& part : track.parts) {
     move(part.streak.last_map_m);
+    move(part.steady_fix_map_m);
+    part.steady_off_m = R_new_old * part.steady_off_m;
   }
   for (TrailPoint& point : track.trail) {
     move(point.antenna_map_m);

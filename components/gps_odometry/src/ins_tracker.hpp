@@ -19,11 +19,30 @@ namespace trigpoint::gps_odometry {
 /// A fix is judged in two parts: receivers' heights fail more often than their positions.
 enum Part : std::size_t { kHorizontal = 0, kVertical = 1 };
 
+/// The axes of map that a part consists of.
+struct Span {
+  int first;
+  int count;
+};
+
+inline constexpr std::array<Part, 2> kParts{kHorizontal, kVertical};
+inline constexpr std::array<Span, 2> kSpans{Span{0, 2}, Span{2, 1}};
+
+/// The part's squared Mahalanobis distance.
+double squared_sigmas(const Eigen::Vector3d& innovation_m, const Eigen::Matrix3d& S_m2, Part part);
+
 /// What contradicting fixes have led to, of one part.
 struct Contradiction {
   RefusedStreak streak;
   bool filter_is_suspect{false};  ///< the streak began after an outage
   Nanoseconds absorbed_ns{0};  ///< since when the error state holds a jump of the receiver; 0: no
+  Nanoseconds jumped_ns{0};    ///< the newest jump that was absorbed
+  /// It jumps again and again (stuck, dragged along, wandering): fixes are not used, until they go
+  /// where the strapdown goes.
+  bool unsteady{false};
+  Nanoseconds steady_ns{0};                                   ///< since when they do; 0: not yet
+  Eigen::Vector3d steady_fix_map_m{Eigen::Vector3d::Zero()};  ///< the fix then
+  Eigen::Vector3d steady_off_m{Eigen::Vector3d::Zero()};      ///< that fix less the antenna
 };
 
 /// Where the receiver was, by a fix of some seconds ago.
@@ -125,9 +144,12 @@ class InsTracker {
                     Part part,
                     const Judgement& judgement) const;
   void absorb(InsTrack& track, const MapFix& fix, Part part, const Judgement& judgement) const;
+  bool has_come_back(InsTrack& track, const MapFix& fix, Part part) const;
+  bool is_steady_again(InsTrack& track, const MapFix& fix, Part part) const;
   void recover(InsTrack& track, const MapFix& fix, Part part) const;
   void end_absorptions(InsTrack& track, const MapFix& fix) const;
   void clip(Judgement& judgement, Part part) const;
+  static void ignore(Judgement& judgement, Part part);
   void hold_doubt(InsTrack& track, const MapFix& fix, const Judgement& judgement) const;
   void accept(InsTrack& track, const MapFix& fix) const;
   void watch_motion(InsTrack& track, const MapFix& fix) const;
