@@ -43,6 +43,7 @@ FixOutcome InsTracker::apply(InsTrack& track, const MapFix& fix) const {
   }
   advance(track, fix.checked.stamp_ns);
   watch_motion(track, fix);
+  watch_scatter(track, fix);
   // A start from another filter's word that the very first fix contradicts was a wrong one.
   const bool wrong = is_unconfirmed(track) && !(judge(track.filter, fix).ratio[kHorizontal] <= 1.0);
   if (track.phase == Phase::kRunning &&
@@ -52,7 +53,11 @@ FixOutcome InsTracker::apply(InsTrack& track, const MapFix& fix) const {
     track.heading.restart();
     track.accepted_ns = 0;  // whatever the fix says is better than this
   }
-  return track.phase == Phase::kAligning ? align(track, fix) : filter_fix(track, fix);
+  const FixOutcome outcome = track.phase == Phase::kAligning
+                                 ? align(track, fix)
+                                 : filter_fix(track, as_it_scatters(track, fix));
+  keep_on_the_way(track, fix);
+  return outcome;
 }
 
 // ---- heading ------------------------------------------------------------------------------------
@@ -232,6 +237,7 @@ InsTracker::Judgement InsTracker::judge(const Eskf18& filter, const MapFix& fix)
   judgement.innovation_m = fix.antenna_map_m - expected_fix(filter, lever_base_m_);
   judgement.S_filter_m2 = H * filter.P * H.transpose();
   judgement.R_m2 = config_.eskf18.fix_white_share * fix.covariance_map_m2;
+  judgement.R_m2.diagonal() += fix.added_white_m2;
   for (const Part part : kParts) {
     judgement.ratio[part] =
         squared_sigmas(judgement.innovation_m, judgement.S_m2(), part) / gate_[part];

@@ -4,6 +4,8 @@
 // and wheels, heading with its rival, fixes that contradict the filter.
 #pragma once
 
+#include "trigpoint/base/fix_scatter.hpp"
+
 #include "eskf18.hpp"
 #include "heading.hpp"
 #include "imu_checks.hpp"
@@ -52,6 +54,15 @@ struct TrailPoint {
   double variance_m2{0.0};  ///< horizontal
 };
 
+/// A fix, where the filter had the antenna after it, and the strapdown's way since.
+struct FixOnTheWay {
+  Nanoseconds stamp_ns{0};  ///< 0: none yet
+  Eigen::Vector3d fix_map_m{Eigen::Vector3d::Zero()};
+  Eigen::Vector3d antenna_map_m{Eigen::Vector3d::Zero()};
+  Eigen::Vector3d way_m{Eigen::Vector3d::Zero()};    ///< map's axes, up to the newest fix
+  Eigen::Vector3d said_m2{Eigen::Vector3d::Zero()};  ///< white variance by the receiver
+};
+
 struct InsTrack : Track {
   Eskf18 filter;
   ImuMean imu;  ///< the newest sample
@@ -68,6 +79,8 @@ struct InsTrack : Track {
   Eigen::Vector3d fix_variance_m2{Eigen::Vector3d::Zero()};   ///< of the newest fix; 0: none yet
   Eigen::Vector3d held_variance_m2{Eigen::Vector3d::Zero()};  ///< peak hold of it
   std::array<Contradiction, 2> parts;
+  std::array<FixOnTheWay, 2> lately;  ///< the newer one last
+  std::array<FixScatter, 2> scatter;  ///< by part
   /// Who was right is open: held in what is published (m, per axis of map).
   Eigen::Vector3d doubt_m{Eigen::Vector3d::Zero()};
   Nanoseconds doubt_until_ns{0};
@@ -137,6 +150,9 @@ class InsTracker {
   void follow_receiver(InsTrack& track, const MapFix& fix) const;
   void renew_fix_error(Eskf18& filter, const MapFix& fix, Part part) const;
   Judgement judge(const Eskf18& filter, const MapFix& fix) const;
+  void watch_scatter(InsTrack& track, const MapFix& fix) const;
+  MapFix as_it_scatters(const InsTrack& track, const MapFix& fix) const;
+  void keep_on_the_way(InsTrack& track, const MapFix& fix) const;
   FixOutcome filter_fix(InsTrack& track, const MapFix& fix) const;
   bool resolve(InsTrack& track, const MapFix& fix, Part part, const Judgement& judgement) const;
   bool was_unproven(InsTrack& track,

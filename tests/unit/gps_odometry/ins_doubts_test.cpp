@@ -111,5 +111,23 @@ TEST(InsDoubts, go_on_by_dead_reckoning_where_fixes_are_stuck_and_say_so) {
   }
 }
 
+/// A receiver that claims 2 cm and whose last digit is a metre. Once it was taken for one that
+/// jumps again and again, and the filter went its own way, by tens of metres.
+TEST(InsDoubts, are_none_of_fixes_that_lie_on_a_grid_of_a_metre) {
+  constexpr double kGrid_deg = 1e-5;
+  const auto truth = drive(circle(2.0, 0.133, 2.5), 110.0);
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    const auto inputs = with_fixes(sense(truth, Sensors{}, seed), [](double, GnssFix& fix) {
+      fix.latitude_deg = std::round(fix.latitude_deg / kGrid_deg) * kGrid_deg;
+      fix.longitude_deg = std::round(fix.longitude_deg / kGrid_deg) * kGrid_deg;
+      return true;
+    });
+    GpsOdometry filter(config_with_datum("eskf18"), RobotConfig{});
+    const Horizontal found = horizontal(run(filter, inputs, truth), 20.0, 110.0);
+    std::printf("fixes on a grid of a metre: worst error %.2f m\n", found.error_m);
+    EXPECT_LT(found.error_m, 2.0) << "seed " << seed;
+  }
+}
+
 }  // namespace
 }  // namespace trigpoint::gps_odometry
