@@ -85,6 +85,7 @@ struct FusionGate::Impl {
   bool is_replacement_awaited(Output& out);
   AxisChoices choose_smoothly(const Eigen::Vector3d& reported_m2) const;
   AxisChoice choose_trusted(int axis, double variance_m2) const;
+  bool carries_though_doubted(int axis) const;
   void tell_changes(const MonitorOutcome& outcome, Output& out) const;
   std::optional<Alignment> best_alignment() const;
 
