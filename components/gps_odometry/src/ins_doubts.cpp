@@ -74,7 +74,8 @@ bool InsTracker::is_steady_again(InsTrack& track, const MapFix& fix, Part part) 
   const auto [first, count] = kSpans[part];
   const Vector3d off_m = fix.antenna_map_m - antenna(track.filter, lever_base_m_);
   const double passed_s = to_seconds(fix.checked.stamp_ns - contradiction.steady_ns);
-  const Matrix3d fixes_m2 = 2.0 * fix.covariance_map_m2;
+  const Matrix3d fixes_m2 =
+      2.0 * (fix.covariance_map_m2 + Matrix3d(fix.added_white_m2.asDiagonal()));
   const Matrix3d way_m2 =
       passed_s * passed_s * track.filter.P.block<3, 3>(ins::kVelocity, ins::kVelocity);
   const Vector3d unlike_m = off_m - contradiction.steady_off_m;
