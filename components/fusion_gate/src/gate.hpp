@@ -169,6 +169,7 @@ struct FusionGate::Impl {
   PlacementHistory placements;
   HandOver hand_over;
   std::deque<AcceptedFix> raw_fixes;  // the newest, in map
+  double received_m2{0.0};            // as the first alignment measured the receiver; 0: as it says
   std::array<bool, 3> sigma_passes{true, true, true};
   std::optional<AwaitedReplacement> awaited;
 

@@ -167,6 +167,7 @@ void FusionGate::Impl::add_pair(const AcceptedFix& fix,
       lio ? lio->odom_epoch : 0, window.solution()->T_map_odom, window.solution()->covariance};
   out.state_updates.push_back(rows.make_alignment(fix, alignment));
   alignment_sent_ns = now_ns;
+  received_m2 = window.solution()->received_m2;
   monitor.on_alignment(witness);
   verdicts.record(fix.stamp_ns, true, "alignment", "carries the first alignment");
   if (!was_admitted) {

@@ -34,6 +34,8 @@ Eigen::Matrix3d as_measured(const Eigen::Matrix3d& said_m2,
 
 void FusionGate::Impl::remember_raw(const AcceptedFix& fix) {
   raw_fixes.push_back(fix);
+  auto level_m2 = raw_fixes.back().covariance_map_m2.diagonal().head<2>();
+  level_m2 = level_m2.cwiseMax(received_m2).eval();
   if (raw_fixes.size() > kRawFixesKept) {
     raw_fixes.pop_front();
   }

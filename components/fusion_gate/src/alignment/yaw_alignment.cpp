@@ -356,7 +356,10 @@ std::optional<AlignmentSolution> solve_alignment(const std::vector<AlignmentPair
   solution.outlier_share = outlier_share_of(weights);
   const double of_receiver = received_factor(pairs, estimate);
   double factor = variance_factor(solution.chi_square, dof, least_share_of(pairs));
-  factor = of_receiver > 1.0 ? std::max(factor, of_receiver) : factor;
+  if (of_receiver > 1.0) {
+    factor = std::max(factor, of_receiver);
+    solution.received_m2 = of_receiver * pairs.back().variance_map_m2.head<2>().maxCoeff();
+  }
   const Matrix5d information = system.information / factor + by_heading;  // not of its own
   const Matrix5d covariance = information.ldlt().solve(Matrix5d::Identity());
   solution.covariance = covariance.topLeftCorner<4, 4>();
