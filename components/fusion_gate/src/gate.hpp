@@ -85,6 +85,7 @@ struct FusionGate::Impl {
   bool is_replacement_awaited(Output& out);
   AxisChoices choose_smoothly(const Eigen::Vector3d& reported_m2) const;
   AxisChoice choose_trusted(int axis, double variance_m2) const;
+  bool carries_though_doubted(int axis) const;
   void tell_changes(const MonitorOutcome& outcome, Output& out) const;
   std::optional<Alignment> best_alignment() const;
 
@@ -168,6 +169,7 @@ struct FusionGate::Impl {
   PlacementHistory placements;
   HandOver hand_over;
   std::deque<AcceptedFix> raw_fixes;  // the newest, in map
+  double received_m2{0.0};            // as the first alignment measured the receiver; 0: as it says
   std::array<bool, 3> sigma_passes{true, true, true};
   std::optional<AwaitedReplacement> awaited;
 

@@ -138,6 +138,8 @@ void FusionGate::Impl::add_pair(const AcceptedFix& fix,
   const Eigen::Vector3d antenna_odom_m = at_fix.T_frame_child * robot.antenna_position_base_m;
   const Eigen::Vector3d variance_m2 = floored(fix.covariance_map_m2, config.min_sigma_m).diagonal();
   const Witness witness = witness_of(fix, at_fix);
+  const Eigen::Vector2d received_off_m =
+      (witness.as_received().antenna_map_m - fix.antenna_map_m).head<2>();
   heading.match(lio_poses);
   filter_heading.match(lio_poses);
   const std::optional<YawPrior> measured = heading.prior();
@@ -147,7 +149,9 @@ void FusionGate::Impl::add_pair(const AcceptedFix& fix,
                                  variance_m2,
                                  antenna_odom_m,
                                  at_fix.distance_m,
-                                 least_share_of(witness).mean()});
+                                 least_share_of(witness).mean(),
+                                 {},
+                                 received_off_m});
   tell_of_heading(measured, out);
   if (!window.admitted()) {
     const std::string why = window.obstacle().value_or("no solution");
@@ -163,6 +167,7 @@ void FusionGate::Impl::add_pair(const AcceptedFix& fix,
       lio ? lio->odom_epoch : 0, window.solution()->T_map_odom, window.solution()->covariance};
   out.state_updates.push_back(rows.make_alignment(fix, alignment));
   alignment_sent_ns = now_ns;
+  received_m2 = window.solution()->received_m2;
   monitor.on_alignment(witness);
   verdicts.record(fix.stamp_ns, true, "alignment", "carries the first alignment");
   if (!was_admitted) {

@@ -34,6 +34,8 @@ Eigen::Matrix3d as_measured(const Eigen::Matrix3d& said_m2,
 
 void FusionGate::Impl::remember_raw(const AcceptedFix& fix) {
   raw_fixes.push_back(fix);
+  auto level_m2 = raw_fixes.back().covariance_map_m2.diagonal().head<2>();
+  level_m2 = level_m2.cwiseMax(received_m2).eval();
   if (raw_fixes.size() > kRawFixesKept) {
     raw_fixes.pop_front();
   }
@@ -96,8 +98,15 @@ void FusionGate::Impl::judge_values(const AcceptedFix& fix,
   }
   if (any_fused(choices) || outcome.trusted[0]) {
     AcceptedFix weighted = fix;
-    weighted.covariance_map_m2 =
-        as_measured(fix.covariance_map_m2, monitor.scatter_map_m2(*lio), least_share_of(witness));
+    if (outcome.trusted[0]) {
+      weighted.covariance_map_m2 =
+          as_measured(fix.covariance_map_m2, monitor.scatter_map_m2(*lio), least_share_of(witness));
+    } else {
+      weighted = witness.as_received();
+      weighted.covariance_map_m2 =
+          Eigen::Matrix3d::Identity() *
+          std::max(monitor.doubted_variance_m2(), fix.covariance_map_m2.diagonal().maxCoeff());
+    }
     send_rows(weighted, choices, out);
     monitor.on_rows({choices[0].decision == AxisDecision::kFused,
                      choices[1].decision == AxisDecision::kFused,
@@ -207,6 +216,14 @@ AxisChoices FusionGate::Impl::choose_smoothly(const Eigen::Vector3d& reported_m2
       choice.decision = AxisDecision::kLio;
       choice.reason = trust.reason().reason;
     }
+    if (!level.trusted() && carries_though_doubted(axis)) {
+      choice.decision = AxisDecision::kFused;
+      choice.sigma_m = std::sqrt(monitor.doubted_variance_m2());
+      choice.reason += sentence(
+          "; LIO is blind along it and knows less: GPS carries the axis with "
+          "a sigma of %.2f m, as it contradicts LIO",
+          choice.sigma_m);
+    }
     if (choice.decision == AxisDecision::kLio && monitor.is_blind(*lio, axis)) {
       choice.decision = AxisDecision::kCoast;
       choice.reason += kCoasting;
@@ -227,6 +244,13 @@ AxisChoice FusionGate::Impl::choose_trusted(int axis, double variance_m2) const 
     choice.reason += ", but LIO is blind along it: GPS carries the axis";
   }
   return choice;
+}
+
+/// Where LIO is blind and GPS is not believed neither is right: the one that is off by less is
+/// taken for what it is worth.
+bool FusionGate::Impl::carries_though_doubted(int axis) const {
+  return part_of(axis) == Part::kLevel && monitor.is_blind(*lio, axis) &&
+         monitor.doubted_variance_m2() <= monitor.blind_variance_map_m2(*lio)[axis];
 }
 
 void FusionGate::Impl::tell_changes(const MonitorOutcome& outcome, Output& out) const {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
-// What fixes do in eskf18: heading from motion with its rival, the clip gate, and who is wrong when
-// fixes contradict the filter.
+// What fixes do in eskf18: heading from motion with its rival, and the clip gate.
 #include "trigpoint/base/so3.hpp"
 
 #include "ins_tracker.hpp"
@@ -20,30 +19,13 @@ using Eigen::Vector3d;
 
 constexpr double kPi = std::numbers::pi;
 constexpr double kTeleportMargin_m = 5.0;
-constexpr double kOtherReceiver = 2.0;   // ratio of variances that means another kind of solution
-constexpr double kDecided = 12.0;        // log of the likelihood ratio
-constexpr double kTurnRound = 4.0;       // the same, to exchange filter and rival
-constexpr double kWorstFixFit = 25.0;    // a bad fix speaks for neither heading
-constexpr double kWrongFix_m = 0.5;      // wrong ambiguities: 15 % of re-fixes, 0.4 to 1.6 m
-constexpr double kMostOfOneFix = 1.0;    // of log_ratio: first fits are bad for either heading
-constexpr double kReadmission_m = 10.0;  // step after an outage that is remembered
-constexpr double kLostSpeed_mps = 2.0;   // doubts after the position had to be set
-constexpr double kLostYaw_rad = 0.5;
-constexpr double kStillAbsorbed = 3.0;  // sigmas of the class
-
-struct Span {
-  int first;
-  int count;
-};
-
-constexpr std::array<Part, 2> kParts{kHorizontal, kVertical};
-constexpr std::array<Span, 2> kSpans{Span{0, 2}, Span{2, 1}};
-
-double distance2(const Vector3d& innovation, const Matrix3d& S, Part part) {
-  const auto [first, count] = kSpans[part];
-  const Eigen::VectorXd nu = innovation.segment(first, count);
-  return nu.dot(S.block(first, first, count, count).ldlt().solve(nu));
-}
+constexpr double kOtherReceiver = 2.0;  // ratio of variances that means another kind of solution
+constexpr double kDecided = 12.0;       // log of the likelihood ratio
+constexpr double kTurnRound = 4.0;      // the same, to exchange filter and rival
+constexpr double kWorstFixFit = 25.0;   // a bad fix speaks for neither heading
+constexpr double kWrongFix_m = 0.5;     // wrong ambiguities: 15 % of re-fixes, 0.4 to 1.6 m
+constexpr double kNothing_m2 = 1e8;     // of a fix that is not used
+constexpr double kMostOfOneFix = 1.0;   // of log_ratio: first fits are bad for either heading
 
 /// -2 log of the innovation's density, but for a constant; outliers are cut off.
 double misfit(const Vector3d& innovation, const Matrix3d& S) {
@@ -61,6 +43,7 @@ FixOutcome InsTracker::apply(InsTrack& track, const MapFix& fix) const {
   }
   advance(track, fix.checked.stamp_ns);
   watch_motion(track, fix);
+  watch_scatter(track, fix);
   // A start from another filter's word that the very first fix contradicts was a wrong one.
   const bool wrong = is_unconfirmed(track) && !(judge(track.filter, fix).ratio[kHorizontal] <= 1.0);
   if (track.phase == Phase::kRunning &&
@@ -70,7 +53,11 @@ FixOutcome InsTracker::apply(InsTrack& track, const MapFix& fix) const {
     track.heading.restart();
     track.accepted_ns = 0;  // whatever the fix says is better than this
   }
-  return track.phase == Phase::kAligning ? align(track, fix) : filter_fix(track, fix);
+  const FixOutcome outcome = track.phase == Phase::kAligning
+                                 ? align(track, fix)
+                                 : filter_fix(track, as_it_scatters(track, fix));
+  keep_on_the_way(track, fix);
+  return outcome;
 }
 
 // ---- heading ------------------------------------------------------------------------------------
@@ -209,23 +196,28 @@ void InsTracker::follow_receiver(InsTrack& track, const MapFix& fix) const {
   const Vector3d last = track.fix_variance_m2;
   const double elapsed_s =
       track.accepted_ns > 0 ? to_seconds(fix.checked.stamp_ns - track.accepted_ns) : 0.0;
-  const bool other = (now.array() > kOtherReceiver * last.array()).any() ||
-                     (last.array() > kOtherReceiver * now.array()).any() ||
-                     elapsed_s > config_.eskf18.suspect_outage_s;
+  const bool changed = (now.array() > kOtherReceiver * last.array()).any() ||
+                       (last.array() > kOtherReceiver * now.array()).any();
+  const bool silent = elapsed_s > config_.eskf18.suspect_outage_s;
   track.fix_variance_m2 = now;
   const double keep =
       std::exp(-std::clamp(elapsed_s, 0.0, 60.0) / config_.eskf18.better_class_decay_s);
   track.held_variance_m2 = now.cwiseMax(keep * track.held_variance_m2 + (1.0 - keep) * now);
-  if (elapsed_s > config_.eskf18.suspect_outage_s && track.phase == Phase::kRunning) {
+  if (silent && track.phase == Phase::kRunning) {
     // A new solution after an outage: no better than the dead reckoning until it has proven itself.
     const Vector3d known_m2 = track.filter.P.diagonal().segment<3>(ins::kPosition);
     track.held_variance_m2 =
         track.held_variance_m2.cwiseMax(known_m2.cwiseMin(kWrongFix_m * kWrongFix_m));
   }
-  if (other && track.phase == Phase::kRunning) {
-    for (const Part part : kParts) {
+  if (track.phase != Phase::kRunning) {
+    return;
+  }
+  for (const Part part : kParts) {
+    // Fixes that are not used are no silence.
+    if (changed || (silent && !track.parts[part].unsteady)) {
       for_each(track, [&](Eskf18& filter) { renew_fix_error(filter, fix, part); });
       track.parts[part].absorbed_ns = 0;
+      track.parts[part].unsteady = false;
     }
   }
 }
@@ -245,8 +237,10 @@ InsTracker::Judgement InsTracker::judge(const Eskf18& filter, const MapFix& fix)
   judgement.innovation_m = fix.antenna_map_m - expected_fix(filter, lever_base_m_);
   judgement.S_filter_m2 = H * filter.P * H.transpose();
   judgement.R_m2 = config_.eskf18.fix_white_share * fix.covariance_map_m2;
+  judgement.R_m2.diagonal() += fix.added_white_m2;
   for (const Part part : kParts) {
-    judgement.ratio[part] = distance2(judgement.innovation_m, judgement.S_m2(), part) / gate_[part];
+    judgement.ratio[part] =
+        squared_sigmas(judgement.innovation_m, judgement.S_m2(), part) / gate_[part];
   }
   return judgement;
 }
@@ -260,6 +254,15 @@ void InsTracker::clip(Judgement& judgement, Part part) const {
   judgement.R_m2.block(first, first, count, count) =
       judgement.ratio[part] * S.block(first, first, count, count) -
       judgement.S_filter_m2.block(first, first, count, count);
+}
+
+/// R such that the part says nothing.
+void InsTracker::ignore(Judgement& judgement, Part part) {
+  const auto [first, count] = kSpans[part];
+  judgement.R_m2.block(0, 2, 2, 1).setZero();
+  judgement.R_m2.block(2, 0, 1, 2).setZero();
+  judgement.R_m2.block(first, first, count, count).setZero();
+  judgement.R_m2.diagonal().segment(first, count).setConstant(kNothing_m2);
 }
 
 FixOutcome InsTracker::filter_fix(InsTrack& track, const MapFix& fix) const {
@@ -277,7 +280,10 @@ FixOutcome InsTracker::filter_fix(InsTrack& track, const MapFix& fix) const {
   hold_doubt(track, fix, judgement);
   std::array<bool, 2> clipped{};
   for (const Part part : kParts) {
-    if (judgement.ratio[part] <= 1.0) {
+    if (track.parts[part].unsteady) {
+      clipped[part] = !is_steady_again(track, fix, part);
+      judgement = judge(track.filter, fix);
+    } else if (judgement.ratio[part] <= 1.0) {
       track.parts[part].streak = RefusedStreak{};
     } else if (resolve(track, fix, part, judgement)) {
       judgement = judge(track.filter, fix);
@@ -288,7 +294,14 @@ FixOutcome InsTracker::filter_fix(InsTrack& track, const MapFix& fix) const {
   const double innovation_m = judgement.innovation_m.norm();
   const double distance = gate_[kHorizontal] * judgement.ratio[kHorizontal];
   for (const Part part : kParts) {
-    if (clipped[part]) {
+    if (!clipped[part]) {
+      continue;
+    }
+    // An outlier moves the filter by little, but many of a receiver that is known to be off take
+    // its velocity along.
+    if (track.parts[part].unsteady || track.parts[part].absorbed_ns > 0) {
+      ignore(judgement, part);
+    } else {
       clip(judgement, part);
     }
   }
@@ -323,146 +336,6 @@ FixOutcome InsTracker::filter_fix(InsTrack& track, const MapFix& fix) const {
     return {true, "recovered", "The position is set to fixes that contradicted it for long."};
   }
   return {true, "", ""};
-}
-
-/// A step after an outage may be the filter's drift or the receiver's error: remembered when large.
-void InsTracker::hold_doubt(InsTrack& track, const MapFix& fix, const Judgement& judgement) const {
-  const double age_s = to_seconds(fix.checked.stamp_ns - track.accepted_ns);
-  const double least =
-      kReadmission_m + 3.0 * std::sqrt(fix.covariance_map_m2.diagonal().maxCoeff());
-  if (age_s > config_.eskf18.suspect_outage_s && judgement.innovation_m.norm() > least) {
-    track.doubt_m = judgement.innovation_m.cwiseAbs().cwiseMax(track.doubt_m);
-    track.doubt_until_ns = fix.checked.stamp_ns + from_seconds(config_.eskf18.doubt_hold_s);
-  }
-}
-
-/// True when the contradiction was explained, and the fix is to be judged anew.
-bool InsTracker::resolve(InsTrack& track,
-                         const MapFix& fix,
-                         Part part,
-                         const Judgement& judgement) const {
-  Contradiction& contradiction = track.parts[part];
-  if (contradiction.absorbed_ns > 0) {
-    // The receiver may have come back.
-    Eskf18 fresh = track.filter;
-    renew_fix_error(fresh, fix, part);
-    if (judge(fresh, fix).ratio[part] <= 1.0) {
-      for_each(track, [&](Eskf18& filter) { renew_fix_error(filter, fix, part); });
-      contradiction = Contradiction{};
-      // Back where the filter is: it was right.
-      const auto [first, count] = kSpans[part];
-      track.doubt_m.segment(first, count).setZero();
-      return true;
-    }
-  }
-  if (was_unproven(track, fix, part, judgement)) {
-    return true;
-  }
-  extend(contradiction.streak, fix, config_.highest_speed_mps);
-  if (contradiction.streak.count == 1) {
-    const double age_s = to_seconds(fix.checked.stamp_ns - track.accepted_ns);
-    contradiction.filter_is_suspect =
-        age_s > config_.eskf18.suspect_outage_s || fix.checked.stamp_ns < track.doubt_until_ns;
-  }
-  if (contradiction.filter_is_suspect) {
-    if (is_believed(contradiction.streak, config_.recovery_s)) {
-      recover(track, fix, part);
-      return true;
-    }
-    return false;
-  }
-  if (contradiction.streak.count >= config_.eskf18.absorb_fixes) {
-    absorb(track, fix, part, judgement);
-    return true;
-  }
-  return false;
-}
-
-/// Where the position still rests on a solution that is not proven (peak hold), a step within that
-/// variance is a correction.
-bool InsTracker::was_unproven(InsTrack& track,
-                              const MapFix& fix,
-                              Part part,
-                              const Judgement& judgement) const {
-  const Vector3d held_m2 = (track.held_variance_m2 - track.fix_variance_m2).cwiseMax(0.0);
-  const Matrix3d S = judgement.S_m2() + Matrix3d(held_m2.asDiagonal());
-  if (distance2(judgement.innovation_m, S, part) > gate_[part]) {
-    return false;
-  }
-  const int first = kSpans[part].first;  // clang 14 captures no structured bindings
-  const int count = kSpans[part].count;
-  for_each(track, [&](Eskf18& filter) {
-    for (int i = first; i < first + count; ++i) {
-      filter.P(ins::kPosition + i, ins::kPosition + i) += held_m2(i);
-    }
-  });
-  return judge(track.filter, fix).ratio[part] <= 1.0;
-}
-
-/// The receiver has jumped: its error state takes the difference, the position stays.
-void InsTracker::absorb(InsTrack& track,
-                        const MapFix& fix,
-                        Part part,
-                        const Judgement& judgement) const {
-  const auto [first, count] = kSpans[part];
-  for (int i = first; i < first + count; ++i) {
-    const double jump_m = judgement.innovation_m(i);
-    for_each(track, [&](Eskf18& filter) {
-      filter.P(ins::kFixError + i, ins::kFixError + i) += jump_m * jump_m;
-    });
-    track.doubt_m(i) = std::max(track.doubt_m(i), 0.5 * std::abs(jump_m));
-  }
-  Contradiction& contradiction = track.parts[part];
-  contradiction.streak = RefusedStreak{};
-  if (contradiction.absorbed_ns == 0) {
-    contradiction.absorbed_ns = fix.checked.stamp_ns;
-  }
-  track.doubt_until_ns = std::max(track.doubt_until_ns, fix.checked.stamp_ns);
-}
-
-/// The filter was wrong: the position is free to follow the fix.
-void InsTracker::recover(InsTrack& track, const MapFix& fix, Part part) const {
-  const int first = kSpans[part].first;  // clang 14 captures no structured bindings
-  const int count = kSpans[part].count;
-  const bool lost = track.parts[part].filter_is_suspect && part == kHorizontal;
-  const Vector3d apart = fix.antenna_map_m - antenna(track.filter, lever_base_m_);
-  for_each(track, [&](Eskf18& filter) {
-    renew_fix_error(filter, fix, part);
-    for (int i = first; i < first + count; ++i) {
-      reset_axis(filter, ins::kPosition + i, apart(i) * apart(i) + fix.covariance_map_m2(i, i));
-    }
-    if (lost) {
-      filter.P.diagonal().segment<3>(ins::kVelocity).array() += kLostSpeed_mps * kLostSpeed_mps;
-      doubt_rotation(filter, {0.0, 0.0, kLostYaw_rad});
-    }
-  });
-  for (int i = first; i < first + count; ++i) {
-    track.doubt_m(i) = std::max(track.doubt_m(i), std::abs(apart(i)));
-  }
-  track.doubt_until_ns = fix.checked.stamp_ns + from_seconds(config_.eskf18.doubt_hold_s);
-  track.parts[part] = Contradiction{};
-  ++track.recoveries;
-}
-
-void InsTracker::end_absorptions(InsTrack& track, const MapFix& fix) const {
-  const Eskf18Config& c = config_.eskf18;
-  for (const Part part : kParts) {
-    const Nanoseconds since_ns = track.parts[part].absorbed_ns;
-    if (since_ns == 0) {
-      continue;
-    }
-    const auto [first, count] = kSpans[part];
-    const double error_m = track.filter.fix_error_map_m.segment(first, count).norm();
-    const double sigma_m =
-        std::sqrt(c.fix_slow_share * fix.covariance_map_m2.diagonal().segment(first, count).sum());
-    if (error_m < kStillAbsorbed * sigma_m) {
-      track.parts[part].absorbed_ns = 0;
-    } else if (to_seconds(fix.checked.stamp_ns - since_ns) > c.absorb_limit_s) {
-      recover(track, fix, part);
-    } else {
-      track.doubt_until_ns = std::max(track.doubt_until_ns, fix.checked.stamp_ns);
-    }
-  }
 }
 
 void InsTracker::accept(InsTrack& track, const MapFix& fix) const {

@@ -75,6 +75,7 @@ void InsTracker::start(InsTrack& track, const CheckedImu& imu) const {
   // The IMU's clock may have moved: what was stamped before says nothing any more.
   track.no_side_slip_ns = track.doubt_until_ns = 0;
   track.parts = {};
+  track.lately = {};
   track.doubt_m.setZero();
 }
 
@@ -376,6 +377,13 @@ void InsTracker::change_frame(InsTrack& track,
   track.aiding.prior_yaw_map_relative_rad += std::atan2(R_new_old(1, 0), R_new_old(0, 0));
   for (Contradiction& part : track.parts) {
     move(part.streak.last_map_m);
+    move(part.steady_fix_map_m);
+    part.steady_off_m = R_new_old * part.steady_off_m;
+  }
+  for (FixOnTheWay& point : track.lately) {
+    move(point.fix_map_m);
+    move(point.antenna_map_m);
+    point.way_m = R_new_old * point.way_m;
   }
   for (TrailPoint& point : track.trail) {
     move(point.antenna_map_m);

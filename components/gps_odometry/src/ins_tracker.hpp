@@ -4,6 +4,8 @@
 // and wheels, heading with its rival, fixes that contradict the filter.
 #pragma once
 
+#include "trigpoint/base/fix_scatter.hpp"
+
 #include "eskf18.hpp"
 #include "heading.hpp"
 #include "imu_checks.hpp"
@@ -19,11 +21,30 @@ namespace trigpoint::gps_odometry {
 /// A fix is judged in two parts: receivers' heights fail more often than their positions.
 enum Part : std::size_t { kHorizontal = 0, kVertical = 1 };
 
+/// The axes of map that a part consists of.
+struct Span {
+  int first;
+  int count;
+};
+
+inline constexpr std::array<Part, 2> kParts{kHorizontal, kVertical};
+inline constexpr std::array<Span, 2> kSpans{Span{0, 2}, Span{2, 1}};
+
+/// The part's squared Mahalanobis distance.
+double squared_sigmas(const Eigen::Vector3d& innovation_m, const Eigen::Matrix3d& S_m2, Part part);
+
 /// What contradicting fixes have led to, of one part.
 struct Contradiction {
   RefusedStreak streak;
   bool filter_is_suspect{false};  ///< the streak began after an outage
   Nanoseconds absorbed_ns{0};  ///< since when the error state holds a jump of the receiver; 0: no
+  Nanoseconds jumped_ns{0};    ///< the newest jump that was absorbed
+  /// It jumps again and again (stuck, dragged along, wandering): fixes are not used, until they go
+  /// where the strapdown goes.
+  bool unsteady{false};
+  Nanoseconds steady_ns{0};                                   ///< since when they do; 0: not yet
+  Eigen::Vector3d steady_fix_map_m{Eigen::Vector3d::Zero()};  ///< the fix then
+  Eigen::Vector3d steady_off_m{Eigen::Vector3d::Zero()};      ///< that fix less the antenna
 };
 
 /// Where the receiver was, by a fix of some seconds ago.
@@ -31,6 +52,15 @@ struct TrailPoint {
   Nanoseconds stamp_ns{0};  ///< 0: none yet
   Eigen::Vector3d antenna_map_m{Eigen::Vector3d::Zero()};
   double variance_m2{0.0};  ///< horizontal
+};
+
+/// A fix, where the filter had the antenna after it, and the strapdown's way since.
+struct FixOnTheWay {
+  Nanoseconds stamp_ns{0};  ///< 0: none yet
+  Eigen::Vector3d fix_map_m{Eigen::Vector3d::Zero()};
+  Eigen::Vector3d antenna_map_m{Eigen::Vector3d::Zero()};
+  Eigen::Vector3d way_m{Eigen::Vector3d::Zero()};    ///< map's axes, up to the newest fix
+  Eigen::Vector3d said_m2{Eigen::Vector3d::Zero()};  ///< white variance by the receiver
 };
 
 struct InsTrack : Track {
@@ -49,6 +79,8 @@ struct InsTrack : Track {
   Eigen::Vector3d fix_variance_m2{Eigen::Vector3d::Zero()};   ///< of the newest fix; 0: none yet
   Eigen::Vector3d held_variance_m2{Eigen::Vector3d::Zero()};  ///< peak hold of it
   std::array<Contradiction, 2> parts;
+  std::array<FixOnTheWay, 2> lately;  ///< the newer one last
+  std::array<FixScatter, 2> scatter;  ///< by part
   /// Who was right is open: held in what is published (m, per axis of map).
   Eigen::Vector3d doubt_m{Eigen::Vector3d::Zero()};
   Nanoseconds doubt_until_ns{0};
@@ -118,6 +150,9 @@ class InsTracker {
   void follow_receiver(InsTrack& track, const MapFix& fix) const;
   void renew_fix_error(Eskf18& filter, const MapFix& fix, Part part) const;
   Judgement judge(const Eskf18& filter, const MapFix& fix) const;
+  void watch_scatter(InsTrack& track, const MapFix& fix) const;
+  MapFix as_it_scatters(const InsTrack& track, const MapFix& fix) const;
+  void keep_on_the_way(InsTrack& track, const MapFix& fix) const;
   FixOutcome filter_fix(InsTrack& track, const MapFix& fix) const;
   bool resolve(InsTrack& track, const MapFix& fix, Part part, const Judgement& judgement) const;
   bool was_unproven(InsTrack& track,
@@ -125,9 +160,12 @@ class InsTracker {
                     Part part,
                     const Judgement& judgement) const;
   void absorb(InsTrack& track, const MapFix& fix, Part part, const Judgement& judgement) const;
+  bool has_come_back(InsTrack& track, const MapFix& fix, Part part) const;
+  bool is_steady_again(InsTrack& track, const MapFix& fix, Part part) const;
   void recover(InsTrack& track, const MapFix& fix, Part part) const;
   void end_absorptions(InsTrack& track, const MapFix& fix) const;
   void clip(Judgement& judgement, Part part) const;
+  static void ignore(Judgement& judgement, Part part);
   void hold_doubt(InsTrack& track, const MapFix& fix, const Judgement& judgement) const;
   void accept(InsTrack& track, const MapFix& fix) const;
   void watch_motion(InsTrack& track, const MapFix& fix) const;

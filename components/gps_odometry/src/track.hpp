@@ -28,6 +28,7 @@ struct MapFix {
   CheckedFix checked;
   Eigen::Vector3d antenna_map_m{Eigen::Vector3d::Zero()};
   Eigen::Matrix3d covariance_map_m2{Eigen::Matrix3d::Identity()};
+  Eigen::Vector3d added_white_m2{Eigen::Vector3d::Zero()};  ///< its scatter beyond what it says
 };
 
 /// Fixes that were refused one after another and agree with each other.

@@ -197,6 +197,33 @@ TEST_P(SmoothMode, coasts_and_says_so_where_lio_is_blind_and_gps_is_away) {
   EXPECT_GT(drive.share_used(0, 82.0, 99.0), 0.9);
 }
 
+/// A receiver that wanders by a metre at a stated centimetre is found out where LIO sees; where LIO
+/// is blind it is still worth that metre, and LIO slides by more.
+TEST_P(SmoothMode, is_carried_by_a_receiver_that_lies_by_less_than_lio_slides) {
+  settings.is_blind = [](double at_s) { return at_s >= 70.0 && at_s < 130.0; };
+  settings.speed_blind_share = 0.2;
+  settings.lie_enu_m = [](double at_s) {
+    const double size_m = at_s < 50.0 ? 0.0 : 1.2;
+    return Eigen::Vector3d(size_m * std::sin(0.5 * at_s), size_m * std::cos(0.4 * at_s), 0.0);
+  };
+  LyingDrive drive(settings);
+  drive.run();
+  EXPECT_TRUE(drive.has_event("gps_doubted"));
+  EXPECT_LT(drive.share_used(0, 55.0, 70.0), 0.05) << "LIO sees";
+  EXPECT_THAT(status_at(drive, 100.0).axes[0].reason, HasSubstr("LIO is blind along it"));
+  EXPECT_LT(drive.worst(0, 1, 70.0, 130.0), 8.0);
+  double most_sigmas = 0.0;
+  for (const DriveSample& sample : drive.samples) {
+    if (sample.at_s >= 70.0 && sample.at_s < 130.0) {
+      most_sigmas =
+          std::max(most_sigmas, sample.error_m.head<2>().norm() / sample.sigma_m.head<2>().norm());
+    }
+  }
+  EXPECT_LT(most_sigmas, 3.0);
+  std::printf(
+      "a liar and a blind LIO: %.2f m, %.1f sigma\n", drive.worst(0, 1, 70.0, 130.0), most_sigmas);
+}
+
 TEST_P(SmoothMode, does_not_lock_itself_out_after_a_drift_of_one_percent) {
   settings.has_fix = [](double at_s) { return at_s < 60.0 || at_s >= 110.0; };
   settings.lio_jump_at_s = 80.0;

@@ -351,5 +351,27 @@ TEST(YawAlignment, returns_nothing_without_pairs_or_with_nan) {
   EXPECT_FALSE(solve_alignment(pairs, {}));
 }
 
+/// Once an alignment from 5 m of fixes on a grid of 1e-5 degrees was 9 degrees off at a stated 0.7:
+/// a filter had smoothed them.
+TEST(YawAlignment, is_no_better_than_what_the_receiver_says_lies_about_the_way) {
+  const AlignmentConfig config;
+  const auto yaw_sigma_rad = [&](const auto& received) {
+    std::vector<AlignmentPair> pairs = drive_pairs({.fixes = 12}, kTrueAlignment);
+    for (AlignmentPair& pair : pairs) {
+      const Eigen::Vector2d smooth_m = pair.p_map_m.head<2>();
+      pair.received_off_m = received(smooth_m) - smooth_m;
+    }
+    return solve_alignment(pairs, config)->yaw_sigma_rad();
+  };
+  const auto same = [](const Eigen::Vector2d& p) -> Eigen::Vector2d { return p; };
+  const auto near = [](const Eigen::Vector2d& p) -> Eigen::Vector2d { return p.array() + 0.01; };
+  const auto on_grid = [](const Eigen::Vector2d& p) -> Eigen::Vector2d {
+    return p.array().round();
+  };
+  EXPECT_EQ(yaw_sigma_rad(near), yaw_sigma_rad(same));
+  EXPECT_LT(yaw_sigma_rad(same), 0.5 * config.max_yaw_sigma_rad);
+  EXPECT_GT(yaw_sigma_rad(on_grid), 3.0 * config.max_yaw_sigma_rad);
+}
+
 }  // namespace
 }  // namespace trigpoint::fusion_gate

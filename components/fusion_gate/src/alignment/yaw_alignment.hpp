@@ -35,11 +35,13 @@ struct AlignmentPair {
   /// Of its variance, when the residuals testify that it is smaller: what the receiver itself says.
   double least_share{1.0};
   Slide slide{};  ///< since then
+  /// What the receiver itself said less p_map_m, east and north: a filter smooths what it scatters.
+  Eigen::Vector2d received_off_m{Eigen::Vector2d::Zero()};
 };
 
 struct AlignmentSolution {
   YawPose T_map_odom;          ///< as of the newest pair
-  Eigen::Matrix4d covariance;  ///< yaw, x, y, z; already scaled by max(1, chi_square / dof)
+  Eigen::Matrix4d covariance;  ///< yaw, x, y, z; already scaled by what the residuals show
   double scale{1.0};           ///< p_map = T_map_odom (scale x, scale y, z)
   /// Of the scale: with yaw, x, y, z, and its variance.
   Eigen::Matrix<double, 5, 1> scale_covariance{Eigen::Matrix<double, 5, 1>::Zero()};
@@ -48,6 +50,9 @@ struct AlignmentSolution {
   double chi_square_limit{0.0};
   double outlier_share{0.0};
   std::size_t pairs{0};
+  /// Of the receiver's own fixes, along east and north, where they lie about the solution by more
+  /// than the pairs' variance says; else 0.
+  double received_m2{0.0};
   bool contradicts_heading{false};  ///< which was left out therefore
 
   double yaw_sigma_rad() const;

@@ -240,6 +240,26 @@ Tests FixMonitor::test(const Witness& witness,
   return tests;
 }
 
+double FixMonitor::worth_of_doubted_m2(const Witness& witness,
+                                       const Sighting& sighting,
+                                       const LioStatus& lio) const {
+  const AcceptedFix& fix = witness.as_received();
+  std::vector<Difference> differences{level_difference(fix, sighting, lio, Part::kLevel)};
+  for (const double window_s : kWindows_s) {
+    const Sighting* before = trusted_before(sighting.stamp_ns, window_s, Part::kLevel);
+    if (before != nullptr) {
+      differences.push_back(compare_displacement(*before, sighting, lio, config_));
+    }
+  }
+  double worst_m2 = 0.0;
+  for (const Difference& difference : differences) {
+    const Eigen::Vector3d explained_m2 = difference.covariance_m2.diagonal();
+    const Eigen::Vector3d excess_m2 = (difference.d_map_m.cwiseAbs2() - explained_m2).cwiseMax(0.0);
+    worst_m2 = std::max(worst_m2, excess_m2.head<2>().sum());
+  }
+  return worst_m2 + sighting.gps_variance_m2.head<2>().maxCoeff();
+}
+
 /// Since when GPS has crept away unnoticed: the newest trusted fix that contradicts this one over a
 /// window. None when it jumped or was away, because then nothing wrong was believed.
 std::optional<Nanoseconds> FixMonitor::taken_in_since(const Sighting& sighting,
@@ -301,6 +321,7 @@ MonitorOutcome FixMonitor::judge(const Witness& witness, const LioStatus& lio) {
     const double since_s = to_seconds(sighting.stamp_ns - last_trusted_[0]->stamp_ns);
     confirmed_s_ += since_s <= kUnbrokenGap_s ? std::max(0.0, since_s) : 0.0;
   }
+  doubted_m2_ = outcome.trusted[0] ? kNaN : worth_of_doubted_m2(witness, sighting, lio);
   note_trusted(witness, sighting, lio, outcome);
   for (const Part part : kParts) {
     if (outcome.trusted[index_of(part)]) {
@@ -406,6 +427,7 @@ void FixMonitor::begin_anew() {
   refused_.clear();
   confirmed_s_ = 0.0;
   crept_ = {};
+  doubted_m2_ = kNaN;
 }
 
 }  // namespace trigpoint::fusion_gate

@@ -91,6 +91,11 @@ class FixMonitor {
   /// too few of them, or LIO was blind.
   Eigen::Vector3d scatter_map_m2(const LioStatus& lio) const;
 
+  /// What the doubted fix that was judged last is worth, along any axis of the level: the
+  /// receiver's own variance and what it is off beyond what LIO explains. A receiver that lies
+  /// along an axis that LIO sees lies no less along one that it does not see.
+  double doubted_variance_m2() const { return doubted_m2_; }
+
   /// A new alignment is in force, or a new odom epoch: nothing of before can be compared.
   void begin_anew();
 
@@ -123,6 +128,9 @@ class FixMonitor {
              const Sighting& sighting,
              const LioStatus& lio,
              Part part) const;
+  double worth_of_doubted_m2(const Witness& witness,
+                             const Sighting& sighting,
+                             const LioStatus& lio) const;
   std::optional<Nanoseconds> taken_in_since(const Sighting& sighting,
                                             const LioStatus& lio,
                                             Part part) const;
@@ -143,6 +151,7 @@ class FixMonitor {
   // By how much trusted fixes are still off T_map_odom: believed, and not yet taken in.
   Eigen::Vector3d unsettled_m2_{Eigen::Vector3d::Zero()};
   Settling settling_;
+  double doubted_m2_{kNaN};
   std::deque<Sighting> refused_;  // by the filter, since a fix was judged
   double confirmed_s_{0.0};       // time for which fixes confirmed the alignment
   std::array<bool, 2> crept_{};   // by part: the doubt began with a displacement, not with a jump

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "trigpoint/base/fix_scatter.hpp"
+
+#include <algorithm>
+
+namespace trigpoint {
+
+namespace {
+
+constexpr std::size_t kLeastFixes = 8;
+// The value that a quarter of all samples stay below, of the smaller of two squared differences of
+// a white sequence over twice its variance (its last one and the one before; by simulation).
+constexpr double kLowerQuarter1 = 0.0291;  // 1 axis
+constexpr double kLowerQuarter2 = 0.1471;  // 2 axes
+
+}  // namespace
+
+double FixScatter::ratio(double apart_m2, double way_m2, double said_m2) {
+  return std::max(0.0, apart_m2 - way_m2) / said_m2;
+}
+
+void FixScatter::add(double ratio_with_last, double ratio_with_one_before) {
+  ratios_[added_ % kFixes] = std::min(ratio_with_last, ratio_with_one_before);
+  ++added_;
+}
+
+double FixScatter::factor(int axes) const {
+  const std::size_t count = std::min(added_, kFixes);
+  if (count < kLeastFixes) {
+    return 1.0;
+  }
+  std::array<double, kFixes> sorted = ratios_;
+  const auto quarter = sorted.begin() + static_cast<std::ptrdiff_t>(count / 4);
+  std::nth_element(sorted.begin(), quarter, sorted.begin() + static_cast<std::ptrdiff_t>(count));
+  return std::max(1.0, *quarter / (axes == 1 ? kLowerQuarter1 : kLowerQuarter2));
+}
+
+}  // namespace trigpoint
