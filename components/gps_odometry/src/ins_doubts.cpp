@@ -113,6 +113,12 @@ bool InsTracker::is_steady_again(InsTrack& track, const MapFix& fix, Part part) 
   return true;
 }
 
+/// Whether the IMU stood at the end of its range: it is the strapdown then that went another way.
+bool InsTracker::has_guessed(const InsTrack& track, Nanoseconds stamp_ns) const {
+  return track.saturated_ns > 0 &&
+         to_seconds(stamp_ns - track.saturated_ns) < config_.eskf18.doubt_hold_s;
+}
+
 /// True when the contradiction was explained, and the fix is to be judged anew.
 bool InsTracker::resolve(InsTrack& track,
                          const MapFix& fix,
@@ -128,8 +134,9 @@ bool InsTracker::resolve(InsTrack& track,
   extend(contradiction.streak, fix, config_.highest_speed_mps);
   if (contradiction.streak.count == 1) {
     const double age_s = to_seconds(fix.checked.stamp_ns - track.accepted_ns);
-    contradiction.filter_is_suspect =
-        age_s > config_.eskf18.suspect_outage_s || fix.checked.stamp_ns < track.doubt_until_ns;
+    contradiction.filter_is_suspect = age_s > config_.eskf18.suspect_outage_s ||
+                                      fix.checked.stamp_ns < track.doubt_until_ns ||
+                                      has_guessed(track, fix.checked.stamp_ns);
   }
   if (contradiction.filter_is_suspect) {
     if (is_believed(contradiction.streak, config_.recovery_s)) {

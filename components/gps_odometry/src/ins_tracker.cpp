@@ -168,6 +168,7 @@ void InsTracker::apply(InsTrack& track, const CheckedImu& imu) const {
   track.imu_ns = imu.stamp_ns;
   track.imu = {imu.raw_gyro_radps, imu.accel_mps2};
   track.imu_saturated = saturated;
+  track.saturated_ns = saturated ? imu.stamp_ns : track.saturated_ns;
   if (gap_s > kLongGap_s && gap_s <= kRestartGap_s) {
     for_each(track, [&](Eskf18& filter) {
       reset_block(filter, ins::kVelocity, Matrix3d::Identity() * 9.0);

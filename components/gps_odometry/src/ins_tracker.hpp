@@ -67,6 +67,7 @@ struct InsTrack : Track {
   Eskf18 filter;
   ImuMean imu;  ///< the newest sample
   bool imu_saturated{false};
+  Nanoseconds saturated_ns{0};     ///< of the newest sample that was; 0: none
   Nanoseconds no_side_slip_ns{0};  ///< of the newest such measurement
   HeadingSearch heading;
 
@@ -154,6 +155,7 @@ class InsTracker {
   MapFix as_it_scatters(const InsTrack& track, const MapFix& fix) const;
   void keep_on_the_way(InsTrack& track, const MapFix& fix) const;
   FixOutcome filter_fix(InsTrack& track, const MapFix& fix) const;
+  bool has_guessed(const InsTrack& track, Nanoseconds stamp_ns) const;
   bool resolve(InsTrack& track, const MapFix& fix, Part part, const Judgement& judgement) const;
   bool was_unproven(InsTrack& track,
                     const MapFix& fix,
