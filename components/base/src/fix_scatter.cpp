@@ -13,6 +13,10 @@ constexpr std::size_t kLeastFixes = 8;
 // a white sequence over twice its variance (its last one and the one before; by simulation).
 constexpr double kLowerQuarter1 = 0.0291;  // 1 axis
 constexpr double kLowerQuarter2 = 0.1471;  // 2 axes
+// What one of a thousand sets of 24 fixes that scatter as they say comes to by chance, and one of 8
+// at three times as much (by simulation).
+constexpr double kChance1 = 8.0;
+constexpr double kChance2 = 3.5;
 
 }  // namespace
 
@@ -33,7 +37,10 @@ double FixScatter::factor(int axes) const {
   std::array<double, kFixes> sorted = ratios_;
   const auto quarter = sorted.begin() + static_cast<std::ptrdiff_t>(count / 4);
   std::nth_element(sorted.begin(), quarter, sorted.begin() + static_cast<std::ptrdiff_t>(count));
-  return std::max(1.0, *quarter / (axes == 1 ? kLowerQuarter1 : kLowerQuarter2));
+  const double measured = *quarter / (axes == 1 ? kLowerQuarter1 : kLowerQuarter2);
+  const double chance =
+      (axes == 1 ? kChance1 : kChance2) * static_cast<double>(kFixes) / static_cast<double>(count);
+  return measured > chance ? measured : 1.0;
 }
 
 }  // namespace trigpoint

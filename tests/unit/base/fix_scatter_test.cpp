@@ -58,6 +58,14 @@ TEST(FixScatter, never_makes_fixes_better_than_they_say) {
   EXPECT_EQ(mean_factor(0.005, 0.0, 1), 1.0);
 }
 
+TEST(FixScatter, leaves_fixes_that_scatter_as_they_say_alone) {
+  for (const int axes : {1, 2}) {
+    const std::vector<double> all = factors(0.02, 0.0, axes);
+    EXPECT_LE(std::count_if(all.begin(), all.end(), [](double factor) { return factor > 1.0; }),
+              kSeeds / 100);
+  }
+}
+
 TEST(FixScatter, measures_a_variance_of_a_hundred_times_what_is_said) {
   EXPECT_NEAR(mean_factor(0.2, 0.0, 2), 100.0, 20.0);
   EXPECT_NEAR(mean_factor(0.2, 0.0, 1), 100.0, 50.0);

@@ -24,7 +24,8 @@ class FixScatter {
   void add(double ratio_with_last, double ratio_with_one_before);
 
   /// Factor, at least 1, by which the white variance of the newest fixes exceeds what they say. Of
-  /// the lower quarter of them: three fixes of ten may be outliers, which are not scatter.
+  /// the lower quarter of them: three fixes of ten may be outliers, which are not scatter. 1 unless
+  /// it is more than chance makes of fixes that are as good as they say.
   double factor(int axes) const;
 
  private:
