@@ -2,6 +2,8 @@
 // Copyright the Trigpoint developers
 #include "scan_matcher.hpp"
 
+#include "trigpoint/base/so3.hpp"
+
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
@@ -17,6 +19,9 @@ namespace {
 
 /// A point that moved less sees the same plane.
 constexpr double kRematch_m = 0.05;
+/// What matches were found to be worth holds this near: points at ten metres keep their planes.
+constexpr double kJudgedWithin_m = kRematch_m;
+constexpr double kJudgedWithin_rad = kRematch_m / 10.0;
 constexpr double kLeastRange_m = 1e-3;
 /// FAST-LIO2's acceptance 1 - 0.9 |r| / sqrt(range) > 0.9: near points must fit more closely.
 constexpr double kGatePerRootRange = 1.0 / 9.0;
@@ -310,12 +315,35 @@ Information<Size> ScanMatcher::weighed(Information<Size> sum,
   return sum;
 }
 
+/// What holds at one pose need not hold at another: where the prediction was a guess, most points
+/// lie beside their planes until the first step.
+bool ScanMatcher::is_judgement_due(const Pose& T_odom_base) const {
+  return !judged_at_ || (T_odom_base.p - judged_at_->p).norm() > kJudgedWithin_m ||
+         so3_log(T_odom_base.q.conjugate() * judged_at_->q).norm() > kJudgedWithin_rad;
+}
+
+/// Surfaces are asked alone again.
+void ScanMatcher::forget_judgement() {
+  also_nearest_ = false;
+  open_ = {};
+  for (std::size_t i = 0; i < residuals_.size(); ++i) {
+    if (std::exchange(residuals_[i].is_of_nearest, false)) {
+      found_[i] = Found::kNotAsked;
+    }
+  }
+}
+
 template <int Size>
 Information<Size> ScanMatcher::linearise_all(const Viewpoint& view,
                                              const MapOrigins* origins,
                                              Scratch<Size>& scratch) {
+  const bool judge = is_judgement_due(view.T_odom_base);
+  if (judge) {
+    forget_judgement();
+    judged_at_ = view.T_odom_base;
+  }
   Information<Size> sum = sum_of_all(view, origins, scratch);
-  if (!std::exchange(judged_, true)) {
+  if (judge) {
     const auto cautious = weighed(sum, 1.0, scratch);
     also_nearest_ = leaves_pose_open(cautious.information.template topLeftCorner<6, 6>());
     if (also_nearest_) {

@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace trigpoint::lio_mapper {
@@ -106,6 +107,8 @@ class ScanMatcher {
 
   void refresh(std::size_t i, const Viewpoint& view, const MapOrigins* origins);
   Found look_up(Ask ask, Residual& residual) const;
+  bool is_judgement_due(const Pose& T_odom_base) const;
+  void forget_judgement();
   static bool leaves_pose_open(const Matrix6d& information);
   double variance_m2(const Residual& residual, double cos_incidence) const;
   void weigh(Residual& residual, double cos_incidence) const;
@@ -145,7 +148,7 @@ class ScanMatcher {
   Pose T_base_lidar_;
   const MatchingConfig& config_;
   Workers& workers_;
-  bool judged_{false};  ///< whether surfaces are enough for this scan
+  std::optional<Pose> judged_at_;  ///< where it was asked whether surfaces are enough
   bool also_nearest_{false};
   OpenAxes open_;
   std::vector<Residual> residuals_;  ///< one a point, also where none was found

@@ -290,6 +290,43 @@ TEST(ScanMatcher, planes_that_follow_the_scan_hold_nothing) {
   EXPECT_NEAR(crowns(2, 2), posts(2, 2), 0.02 * posts(2, 2));
 }
 
+/// The room with crowns before its walls, which are found only by points near them.
+class OvergrownRoom final : public UnchangingMap {
+ public:
+  bool match_surface(const Eigen::Vector3d& p, PlaneMatch& plane) const override {
+    return room_.match_surface(p, plane) &&
+           std::abs(plane.normal.dot(p) + plane.offset_m) < kReach_m;
+  }
+
+  bool match_nearest(const Eigen::Vector3d& p, PlaneMatch& plane) const override {
+    return crowns_.match_nearest(p, plane);
+  }
+
+ private:
+  static constexpr double kReach_m = 0.2;
+  Room room_{true};
+  Grove crowns_{false};
+};
+
+/// From a guess that is far off the walls are out of reach, and what is matched instead holds
+/// nothing. Once they are within reach they hold the pose as ever.
+TEST(ScanMatcher, what_a_guess_looked_like_is_forgotten_where_its_step_leads) {
+  const OvergrownRoom room;
+  const PointCloud points = room_points();
+  MatchingConfig config;
+  config.patch_m = kFinePatch_m;
+  Workers workers{2};
+  ScanMatcher guessing(points, room, Pose{}, config, workers);
+  const Pose guess(Eigen::Quaterniond::Identity(), {0.3, 0.0, 0.0});
+  const Matrix6d at_guess = guessing.linearise(guess).information;
+  const Matrix6d after = guessing.linearise(Pose{}).information;
+  ScanMatcher knowing(points, room, Pose{}, config, workers);
+  const Matrix6d known = knowing.linearise(Pose{}).information;
+  EXPECT_LT(at_guess(0, 0), 0.01 * known(0, 0));
+  EXPECT_NEAR(after(0, 0) / known(0, 0), 1.0, 1e-9);
+  EXPECT_NEAR(after(1, 1) / known(1, 1), 1.0, 1e-9);
+}
+
 /// A tunnel in which nearest points hold the length, each of them where it is: at every point that
 /// stands out from the axis by less than `within_m`.
 class TunnelWithPosts final : public UnchangingMap {
