@@ -212,6 +212,9 @@ void InsTracker::follow_receiver(InsTrack& track, const MapFix& fix) const {
   if (track.phase != Phase::kRunning) {
     return;
   }
+  if (changed) {
+    track.scatter = {};
+  }
   for (const Part part : kParts) {
     // Fixes that are not used are no silence.
     if (changed || (silent && !track.parts[part].unsteady)) {

@@ -20,6 +20,8 @@ constexpr double kRegularTurns = 0.02;
 constexpr double kLeastStepTurns = 0.2;
 constexpr double kLeastStep_s = 0.02;
 constexpr double kStepSigmas = 3.0;
+/// Clocks that are farther apart are not yet the same one: until they are, nothing is a step.
+constexpr double kSameClock_s = 1.0;
 /// Standard deviation of a normal distribution over its median absolute deviation.
 constexpr double kSigmaPerDeviation = 1.4826;
 
@@ -75,9 +77,14 @@ std::optional<double> ClockSteps::step_s(double interval_s,
   }
   const double passed = std::max(1.0, std::round((interval_s + late_s) / turn_s));
   const double step_s = interval_s - passed * turn_s;
+  // Lost clouds while the IMU is late look like a step of whole turns, other than the way back.
+  const bool is_way_back =
+      offset_ns_ != 0 && std::abs(step_s - to_seconds(offset_ns_)) < lag_tolerance_s;
+  const bool may_be_lost = in_rhythm && interval_s < kMostTurnsPassed * turn_s && !is_way_back;
   const bool agree = std::abs(step_s + late_s) < lag_tolerance_s;
-  return agree && std::abs(step_s) >= least_s && passed <= kMostTurnsPassed ? std::optional(step_s)
-                                                                            : std::nullopt;
+  return agree && !may_be_lost && std::abs(step_s) >= least_s && passed <= kMostTurnsPassed
+             ? std::optional(step_s)
+             : std::nullopt;
 }
 
 ClockSteps::Verdict ClockSteps::look(Nanoseconds cloud_stamp_ns,
@@ -98,6 +105,21 @@ ClockSteps::Verdict ClockSteps::look(Nanoseconds cloud_stamp_ns,
   }
   const Typical turn = typical(turns_s_);
   const Typical lag = typical(lags_s_);
+  if (std::abs(lag.middle_s) > kSameClock_s || !(turn.middle_s > 0.0)) {
+    *this = ClockSteps{};
+    return Verdict::kSteady;
+  }
+  // After a pause, in which no rhythm is counted: a clock that is right as it is needs no
+  // correction.
+  const double tolerance_s = std::max(kLeastStep_s, kStepSigmas * lag.spread_s);
+  if (offset_ns_ != 0 && interval_s > kMostTurnsPassed * turn.middle_s &&
+      std::abs(lag_s - lag.middle_s) > tolerance_s &&
+      std::abs(lag_s + to_seconds(offset_ns_) - lag.middle_s) < tolerance_s) {
+    const Nanoseconds back_ns = -offset_ns_;
+    *this = ClockSteps{};
+    step_ns_ = back_ns;
+    return Verdict::kStepped;
+  }
   const bool regular = turn.middle_s > 0.0 && turn.spread_s < kRegularTurns * turn.middle_s;
   const auto found = regular ? step_s(interval_s, lag_s - lag.middle_s, turn.middle_s, lag.spread_s)
                              : std::nullopt;

@@ -191,8 +191,8 @@ std::optional<Pose> refined(const Hypothesis& h,
       position2 * Eigen::Matrix3d::Identity();
   covariance.block<3, 3>(error::kRotation, error::kRotation) = R.transpose() * turn * R;
   const Pose T_base_lidar{Eigen::Quaterniond::Identity(), scan.lidar_position_base_m};
-  // What a scan is worth is judged where the matcher begins. From metres away that is little, and
-  // the prior holds on: so it begins again where it came to.
+  // From metres away a scan is worth little, and the prior holds on: so it begins again where it
+  // came to.
   for (int round = 0; round < kRounds; ++round) {
     ScanMatcher matcher(points_base, map, T_base_lidar, matching, workers);  // axes play no part
     const UpdateResult result = iterated_update(prior,

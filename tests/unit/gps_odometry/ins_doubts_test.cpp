@@ -41,6 +41,9 @@ struct Horizontal {
 
 Horizontal horizontal(const Recorded& result, double from_s, double to_s) {
   Horizontal found;
+  EXPECT_TRUE(std::any_of(result.samples.begin(), result.samples.end(), [&](const Sample& s) {
+    return s.time_s > from_s && s.time_s < to_s;
+  }));
   for (const Sample& sample : result.samples) {
     if (sample.time_s > from_s && sample.time_s < to_s) {
       const double error_m = sample.error_m.head<2>().norm();

@@ -81,11 +81,10 @@ TEST_P(ClockStepOf, is_found_by_the_second_cloud_and_taken_back) {
   EXPECT_NEAR(back.offset_s, 0.0, 1e-6);
 }
 
-// Steps by whole turns look like lost clouds, but for the time of their arrival.
-INSTANTIATE_TEST_SUITE_P(
-    Steps,
-    ClockStepOf,
-    testing::Values(-3600.0, -0.25, -0.3, -0.08, -0.03, 0.04, 0.25, 0.3, 3600.0));
+// Steps by a few turns forward look like lost clouds while the IMU is late.
+INSTANTIATE_TEST_SUITE_P(Steps,
+                         ClockStepOf,
+                         testing::Values(-3600.0, -0.25, -0.3, -0.08, -0.03, 0.04, 0.25, 3600.0));
 
 TEST(ClockSteps, lost_late_doubled_and_swapped_clouds_are_none) {
   const auto expect_none = [](const char* what, int doubtful, const Seen& seen) {
@@ -109,6 +108,10 @@ TEST(ClockSteps, lost_late_doubled_and_swapped_clouds_are_none) {
               }));
   expect_none(
       "IMU stalls", 0, with([](int i, Cloud& c) { c.imu_late_s = i / 10 % 3 ? 0.0 : 0.4; }));
+  expect_none("IMU stalls and clouds are lost", 0, with([](int i, Cloud& c) {
+                c.imu_late_s = i % 30 > 19 && i % 30 < 24 ? 0.1 : 0.0;
+                c.lost = i % 30 == 20;
+              }));
   // A cloud that comes twice, two turns late.
   expect_none("old", 10, with([](int i, Cloud& c) {
                 const bool old = i % 10 == 9;
@@ -119,6 +122,24 @@ TEST(ClockSteps, lost_late_doubled_and_swapped_clouds_are_none) {
       "short sweeps", 0, with([](int i, Cloud& c) { c.points_shift_s = i > 50 ? -0.04 : 0.0; }));
   // Stamped by the host as they arrive, points by the scanner.
   expect_none("other clock", 0, with([](int i, Cloud& c) { c.shift_s = i > 50 ? 0.25 : 0.0; }));
+}
+
+/// The LiDAR counts from its start until its clock is told the time.
+TEST(ClockSteps, a_clock_that_is_told_the_time_was_never_the_imus) {
+  const Seen seen = look_at(60, [](int i) { return shifted(i < 30 ? -1.7e6 : 0.0); });
+  EXPECT_EQ(seen.stepped, 0);
+  EXPECT_EQ(seen.offset_s, 0.0);
+}
+
+/// A driver that is started again with a right clock.
+TEST(ClockSteps, a_correction_ends_where_stamps_are_right_again_after_a_pause) {
+  const Seen seen = look_at(90, [](int i) {
+    Cloud cloud = shifted(i >= 20 && i < 40 ? -0.25 : 0.0);
+    cloud.lost = i >= 40 && i < 60;
+    return cloud;
+  });
+  EXPECT_EQ(seen.stepped, 2);
+  EXPECT_EQ(seen.offset_s, 0.0);
 }
 
 /// Without a rhythm there is nothing to go by.
