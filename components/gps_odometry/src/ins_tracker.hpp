@@ -4,9 +4,8 @@
 // and wheels, heading with its rival, fixes that contradict the filter.
 #pragma once
 
-#include "trigpoint/base/fix_scatter.hpp"
-
 #include "eskf18.hpp"
+#include "fix_scatter.hpp"
 #include "heading.hpp"
 #include "imu_checks.hpp"
 #include "track.hpp"
@@ -65,9 +64,8 @@ struct FixOnTheWay {
 
 struct InsTrack : Track {
   Eskf18 filter;
-  ImuMean imu;  ///< the newest sample
-  bool imu_saturated{false};
-  Nanoseconds saturated_ns{0};     ///< of the newest sample that was; 0: none
+  ImuMean imu;                     ///< the newest sample
+  Nanoseconds saturated_ns{0};     ///< of the newest IMU sample that was; 0: none
   Nanoseconds no_side_slip_ns{0};  ///< of the newest such measurement
   HeadingSearch heading;
 
