@@ -74,6 +74,7 @@ void InsTracker::start(InsTrack& track, const CheckedImu& imu) const {
   track.aiding = AidingState{};
   // The IMU's clock may have moved: what was stamped before says nothing any more.
   track.no_side_slip_ns = track.doubt_until_ns = track.saturated_ns = 0;
+  track.heard_ns = track.accepted_ns;
   track.parts = {};
   track.lately = {};
   track.doubt_m.setZero();
