@@ -27,7 +27,8 @@ FusionGate::Impl::Impl(const Config& config_in, const RobotConfig& robot_in)
       queue(config_in.max_fix_age_s),
       monitor(config_in, robot_in.antenna_position_base_m),
       placements(config_in),
-      hand_over(config_in.smooth.hand_over_mps, config_in.smooth.hand_over_radps) {}
+      hand_over(config_in.smooth.hand_over_mps, config_in.smooth.hand_over_radps),
+      receiver(config_in) {}
 
 FusionGate::FusionGate(const Config& config, const RobotConfig& robot)
     : impl_(std::make_unique<Impl>(config, robot)) {}
@@ -88,6 +89,7 @@ Output FusionGate::on_datum(const Datum& datum) {
   impl_->window.clear();
   impl_->monitor.begin_anew();
   impl_->raw_fixes.clear();
+  impl_->receiver.forget_way();
   for (auto& [writer, source] : impl_->foreign_sources) {
     source.forget_alignment();
   }

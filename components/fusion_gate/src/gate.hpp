@@ -13,6 +13,7 @@
 #include "checks/fix_queue.hpp"
 #include "checks/foreign_source.hpp"
 #include "checks/gps_sources.hpp"
+#include "checks/receiver_worth.hpp"
 #include "checks/verdicts.hpp"
 #include "control/algorithm_one.hpp"
 #include "control/fix_monitor.hpp"
@@ -76,6 +77,8 @@ struct FusionGate::Impl {
 
   // --- mode smooth
   void remember_raw(const AcceptedFix& fix);
+  const AcceptedFix* raw_of(Nanoseconds stamp_ns) const;
+  void measure_receiver(const Witness& witness);
   Eigen::Vector3d least_share_of(const Witness& witness) const;
   Witness witness_of(const AcceptedFix& fix, const PoseBuffer::Sample& at_fix) const;
   void judge_values(const AcceptedFix& fix, const PoseBuffer::Sample& at_fix, Output& out);
@@ -169,7 +172,7 @@ struct FusionGate::Impl {
   PlacementHistory placements;
   HandOver hand_over;
   std::deque<AcceptedFix> raw_fixes;  // the newest, in map
-  double received_m2{0.0};            // as the first alignment measured the receiver; 0: as it says
+  ReceiverWorth receiver;             // what they are worth
   std::array<bool, 3> sigma_passes{true, true, true};
   std::optional<AwaitedReplacement> awaited;
 

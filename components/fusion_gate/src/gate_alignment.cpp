@@ -167,7 +167,9 @@ void FusionGate::Impl::add_pair(const AcceptedFix& fix,
       lio ? lio->odom_epoch : 0, window.solution()->T_map_odom, window.solution()->covariance};
   out.state_updates.push_back(rows.make_alignment(fix, alignment));
   alignment_sent_ns = now_ns;
-  received_m2 = window.solution()->received_m2;
+  const AcceptedFix* said = raw_of(fix.stamp_ns);
+  const double measured_m2 = window.solution()->received_m2;
+  receiver.on_alignment(said == nullptr ? measured_m2 : level_m2(*said), measured_m2);
   monitor.on_alignment(witness);
   verdicts.record(fix.stamp_ns, true, "alignment", "carries the first alignment");
   if (!was_admitted) {
@@ -234,6 +236,7 @@ void FusionGate::Impl::take_lio_status(const LioStatus& next, Output& out) {
     begin_epoch(next, out);
   } else if (lio && lio->reset.counter != next.reset.counter) {
     monitor.on_odom_step();
+    receiver.forget_way();
   }
   lio = next;
   const double distance_m = lio_poses.distance_m();
@@ -264,6 +267,7 @@ void FusionGate::Impl::begin_epoch(const LioStatus& next, Output& out) {
   alignment_sent_ns.reset();
   alignment_not_taken = false;
   monitor.begin_anew();
+  receiver.forget_way();
   placements.clear();
   awaited.reset();
   last_odom.reset();

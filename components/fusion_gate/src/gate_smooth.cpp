@@ -34,19 +34,42 @@ Eigen::Matrix3d as_measured(const Eigen::Matrix3d& said_m2,
 
 void FusionGate::Impl::remember_raw(const AcceptedFix& fix) {
   raw_fixes.push_back(fix);
-  auto level_m2 = raw_fixes.back().covariance_map_m2.diagonal().head<2>();
-  level_m2 = level_m2.cwiseMax(received_m2).eval();
   if (raw_fixes.size() > kRawFixesKept) {
     raw_fixes.pop_front();
   }
 }
 
+/// As the receiver said it; null when that was not heard.
+const AcceptedFix* FusionGate::Impl::raw_of(Nanoseconds stamp_ns) const {
+  const auto raw = std::find_if(raw_fixes.begin(), raw_fixes.end(), [&](const AcceptedFix& r) {
+    return r.stamp_ns == stamp_ns;
+  });
+  return raw == raw_fixes.end() ? nullptr : &*raw;
+}
+
+/// With the receiver's own statement, which counts for no more than it was measured to be worth.
 Witness FusionGate::Impl::witness_of(const AcceptedFix& fix,
                                      const PoseBuffer::Sample& at_fix) const {
-  const auto raw = std::find_if(raw_fixes.begin(), raw_fixes.end(), [&](const AcceptedFix& r) {
-    return r.stamp_ns == fix.stamp_ns;
-  });
-  return {fix, raw == raw_fixes.end() ? std::nullopt : std::optional(*raw), at_fix};
+  Witness witness{fix, std::nullopt, at_fix};
+  if (const AcceptedFix* said = raw_of(fix.stamp_ns)) {
+    witness.raw = *said;
+    auto variance_m2 = witness.raw->covariance_map_m2.diagonal().head<2>();
+    variance_m2 = variance_m2.cwiseMax(receiver.least_m2(level_m2(*said))).eval();
+  }
+  return witness;
+}
+
+void FusionGate::Impl::measure_receiver(const Witness& witness) {
+  const AcceptedFix* said = raw_of(witness.fix.stamp_ns);
+  if (said == nullptr || monitor.is_blind(*lio, 0) || monitor.is_blind(*lio, 1)) {
+    receiver.forget_way();
+    return;
+  }
+  const Eigen::Vector3d lio_odom_m = witness.lio_pose.T_frame_child * robot.antenna_position_base_m;
+  receiver.add(level_m2(*said),
+               said->antenna_map_m.head<2>(),
+               lio_odom_m.head<2>(),
+               lio->T_map_odom.yaw_rad);
 }
 
 /// GPS filters double the sigmas that receivers report and add floors, because some receivers are
@@ -66,6 +89,7 @@ void FusionGate::Impl::judge_values(const AcceptedFix& fix,
                                     const PoseBuffer::Sample& at_fix,
                                     Output& out) {
   const Witness witness = witness_of(fix, at_fix);
+  measure_receiver(witness);
   const MonitorOutcome outcome = monitor.judge(witness, *lio);
   tell_changes(outcome, out);
   if (outcome.realignment) {

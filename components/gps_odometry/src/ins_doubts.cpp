@@ -33,10 +33,7 @@ double squared_sigmas(const Vector3d& innovation_m, const Matrix3d& S_m2, Part p
 /// what is beyond that sigma is remembered when large. A step within it is no evidence against the
 /// fix, however far the dead reckoning had gone.
 void InsTracker::hold_doubt(InsTrack& track, const MapFix& fix, const Judgement& judgement) const {
-  const double age_s = to_seconds(fix.checked.stamp_ns - track.accepted_ns);
-  const double least =
-      kReadmission_m + 3.0 * std::sqrt(fix.covariance_map_m2.diagonal().maxCoeff());
-  if (age_s <= config_.eskf18.suspect_outage_s || judgement.innovation_m.norm() <= least) {
+  if (silence_s(track, fix) <= config_.eskf18.suspect_outage_s) {
     return;
   }
   for (const Part part : kParts) {
@@ -44,6 +41,12 @@ void InsTracker::hold_doubt(InsTrack& track, const MapFix& fix, const Judgement&
       continue;
     }
     const auto [first, count] = kSpans[part];
+    const Vector3d variance_m2 = fix.covariance_map_m2.diagonal();
+    const double least_m =
+        kReadmission_m + 3.0 * std::sqrt(variance_m2.segment(first, count).maxCoeff());
+    if (judgement.innovation_m.segment(first, count).norm() <= least_m) {
+      continue;
+    }
     for (int i = first; i < first + count; ++i) {
       const double excess_m2 =
           judgement.innovation_m(i) * judgement.innovation_m(i) - judgement.S_m2()(i, i);
@@ -68,7 +71,7 @@ bool InsTracker::has_come_back(InsTrack& track, const MapFix& fix, Part part) co
 }
 
 /// Of a receiver that jumped again and again: true when its fixes went where the strapdown went for
-/// long enough. Then the filter was right, or they hold still at another place.
+/// long enough without a silence. Then the filter was right, or they hold still at another place.
 bool InsTracker::is_steady_again(InsTrack& track, const MapFix& fix, Part part) const {
   Contradiction& contradiction = track.parts[part];
   const auto [first, count] = kSpans[part];
@@ -79,7 +82,8 @@ bool InsTracker::is_steady_again(InsTrack& track, const MapFix& fix, Part part) 
   const Matrix3d way_m2 =
       passed_s * passed_s * track.filter.P.block<3, 3>(ins::kVelocity, ins::kVelocity);
   const Vector3d unlike_m = off_m - contradiction.steady_off_m;
-  if (contradiction.steady_ns == 0 ||
+  const bool was_away = silence_s(track, fix) > config_.eskf18.suspect_outage_s;
+  if (contradiction.steady_ns == 0 || was_away ||
       squared_sigmas(unlike_m, fixes_m2 + way_m2, part) > gate_[part]) {
     contradiction.steady_ns = fix.checked.stamp_ns;
     contradiction.steady_fix_map_m = fix.antenna_map_m;
@@ -133,8 +137,7 @@ bool InsTracker::resolve(InsTrack& track,
   }
   extend(contradiction.streak, fix, config_.highest_speed_mps);
   if (contradiction.streak.count == 1) {
-    const double age_s = to_seconds(fix.checked.stamp_ns - track.accepted_ns);
-    contradiction.filter_is_suspect = age_s > config_.eskf18.suspect_outage_s ||
+    contradiction.filter_is_suspect = silence_s(track, fix) > config_.eskf18.suspect_outage_s ||
                                       fix.checked.stamp_ns < track.doubt_until_ns ||
                                       has_guessed(track, fix.checked.stamp_ns);
   }
@@ -147,9 +150,10 @@ bool InsTracker::resolve(InsTrack& track,
   }
   if (contradiction.streak.count >= config_.eskf18.absorb_fixes) {
     if (contradiction.absorbed_ns > 0 &&
-        to_seconds(fix.checked.stamp_ns - contradiction.jumped_ns) < kSteady_s) {
+        to_seconds(contradiction.streak.first_ns - contradiction.jumped_ns) < kSteady_s) {
       contradiction.unsteady = true;
       contradiction.steady_ns = 0;
+      contradiction.streak = RefusedStreak{};
       return false;
     }
     absorb(track, fix, part, judgement);

@@ -51,12 +51,15 @@ FixOutcome InsTracker::apply(InsTrack& track, const MapFix& fix) const {
     track.phase = Phase::kAligning;
     track.has_rival = false;
     track.heading.restart();
-    track.accepted_ns = 0;  // whatever the fix says is better than this
+    track.accepted_ns = track.heard_ns = 0;  // whatever the fix says is better than this
   }
   const FixOutcome outcome = track.phase == Phase::kAligning
                                  ? align(track, fix)
                                  : filter_fix(track, as_it_scatters(track, fix));
   keep_on_the_way(track, fix);
+  if (outcome.accepted || track.parts[kHorizontal].unsteady) {
+    track.heard_ns = fix.checked.stamp_ns;
+  }
   return outcome;
 }
 
@@ -190,12 +193,16 @@ void InsTracker::weigh_rival(InsTrack& track, const MapFix& fix) const {
 
 // ---- fixes --------------------------------------------------------------------------------------
 
+/// Before this fix. Fixes of a receiver that is unsteady are no silence, though they are not used.
+double InsTracker::silence_s(const InsTrack& track, const MapFix& fix) {
+  return track.heard_ns > 0 ? to_seconds(fix.checked.stamp_ns - track.heard_ns) : 0.0;
+}
+
 /// Another kind of solution has another error: what the state has learnt of the old one is gone.
 void InsTracker::follow_receiver(InsTrack& track, const MapFix& fix) const {
   const Vector3d now = fix.covariance_map_m2.diagonal();
   const Vector3d last = track.fix_variance_m2;
-  const double elapsed_s =
-      track.accepted_ns > 0 ? to_seconds(fix.checked.stamp_ns - track.accepted_ns) : 0.0;
+  const double elapsed_s = silence_s(track, fix);
   const bool changed = (now.array() > kOtherReceiver * last.array()).any() ||
                        (last.array() > kOtherReceiver * now.array()).any();
   const bool silent = elapsed_s > config_.eskf18.suspect_outage_s;
@@ -216,7 +223,7 @@ void InsTracker::follow_receiver(InsTrack& track, const MapFix& fix) const {
     track.scatter = {};
   }
   for (const Part part : kParts) {
-    // Fixes that are not used are no silence.
+    // A receiver that jumped again and again is not believed for having been away.
     if (changed || (silent && !track.parts[part].unsteady)) {
       for_each(track, [&](Eskf18& filter) { renew_fix_error(filter, fix, part); });
       track.parts[part].absorbed_ns = 0;

@@ -74,6 +74,7 @@ void InsTracker::start(InsTrack& track, const CheckedImu& imu) const {
   track.aiding = AidingState{};
   // The IMU's clock may have moved: what was stamped before says nothing any more.
   track.no_side_slip_ns = track.doubt_until_ns = track.saturated_ns = 0;
+  track.heard_ns = track.accepted_ns;
   track.parts = {};
   track.lately = {};
   track.doubt_m.setZero();
@@ -148,7 +149,7 @@ void InsTracker::step(InsTrack& track, const CheckedImu& imu, double gap_s, bool
     n.gyro_radps_sqrthz = std::hypot(n.gyro_radps_sqrthz, kGapRate_radps * std::sqrt(gap_s));
     n.accel_mps2_sqrthz = std::hypot(n.accel_mps2_sqrthz, kGapAccel_mps2 * std::sqrt(gap_s));
   }
-  if (saturated || track.imu_saturated) {
+  if (saturated || track.saturated_ns == track.imu_ns) {
     n.gyro_radps_sqrthz = std::hypot(n.gyro_radps_sqrthz, kSaturatedGyro_radps_sqrthz);
     n.accel_mps2_sqrthz = std::hypot(n.accel_mps2_sqrthz, kSaturatedAccel_mps2_sqrthz);
   }
@@ -167,7 +168,6 @@ void InsTracker::apply(InsTrack& track, const CheckedImu& imu) const {
   track.stamp_ns = std::max(track.stamp_ns, imu.stamp_ns);
   track.imu_ns = imu.stamp_ns;
   track.imu = {imu.raw_gyro_radps, imu.accel_mps2};
-  track.imu_saturated = saturated;
   track.saturated_ns = saturated ? imu.stamp_ns : track.saturated_ns;
   if (gap_s > kLongGap_s && gap_s <= kRestartGap_s) {
     for_each(track, [&](Eskf18& filter) {

@@ -4,9 +4,8 @@
 // and wheels, heading with its rival, fixes that contradict the filter.
 #pragma once
 
-#include "trigpoint/base/fix_scatter.hpp"
-
 #include "eskf18.hpp"
+#include "fix_scatter.hpp"
 #include "heading.hpp"
 #include "imu_checks.hpp"
 #include "track.hpp"
@@ -65,9 +64,8 @@ struct FixOnTheWay {
 
 struct InsTrack : Track {
   Eskf18 filter;
-  ImuMean imu;  ///< the newest sample
-  bool imu_saturated{false};
-  Nanoseconds saturated_ns{0};     ///< of the newest sample that was; 0: none
+  ImuMean imu;                     ///< the newest sample
+  Nanoseconds saturated_ns{0};     ///< of the newest IMU sample that was; 0: none
   Nanoseconds no_side_slip_ns{0};  ///< of the newest such measurement
   HeadingSearch heading;
 
@@ -80,6 +78,8 @@ struct InsTrack : Track {
   Eigen::Vector3d fix_variance_m2{Eigen::Vector3d::Zero()};   ///< of the newest fix; 0: none yet
   Eigen::Vector3d held_variance_m2{Eigen::Vector3d::Zero()};  ///< peak hold of it
   std::array<Contradiction, 2> parts;
+  /// Of the newest fix that was used, or was not because the receiver is unsteady; 0: none yet.
+  Nanoseconds heard_ns{0};
   std::array<FixOnTheWay, 2> lately;  ///< the newer one last
   std::array<FixScatter, 2> scatter;  ///< by part
   /// Who was right is open: held in what is published (m, per axis of map).
@@ -149,6 +149,7 @@ class InsTracker {
   void begin_running(InsTrack& track, const MapFix& fix, const HeadingEstimate& heading) const;
   void weigh_rival(InsTrack& track, const MapFix& fix) const;
   void follow_receiver(InsTrack& track, const MapFix& fix) const;
+  static double silence_s(const InsTrack& track, const MapFix& fix);
   void renew_fix_error(Eskf18& filter, const MapFix& fix, Part part) const;
   Judgement judge(const Eskf18& filter, const MapFix& fix) const;
   void watch_scatter(InsTrack& track, const MapFix& fix) const;

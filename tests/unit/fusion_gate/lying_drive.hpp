@@ -29,10 +29,13 @@ struct LyingDriveSettings {
   double duration_s{150.0};
   double speed_mps{3.0};
   double speed_blind_share{0.0};  ///< of the way that LIO loses while it is blind
-  std::function<Eigen::Vector3d(double)> lie_enu_m;  ///< of the fix, at a time; may be empty
-  std::function<bool(double)> has_fix;               ///< may be empty: always
-  std::function<bool(double)> is_blind;              ///< LIO along odom's x; may be empty: never
-  double claimed_sigma_m{0.01};                      ///< horizontally; twice that in height
+  std::function<Eigen::Vector3d(double)> lie_enu_m;      ///< of the fix, at a time; may be empty
+  std::function<Eigen::Vector3d(double)> raw_lie_enu_m;  ///< besides, that the filter smooths out
+  double raw_grid_m{0.0};                       ///< of the receiver's, smoothed out; 0: none
+  std::function<bool(double)> has_fix;          ///< may be empty: always
+  std::function<bool(double)> is_blind;         ///< LIO along odom's x; may be empty: never
+  double claimed_sigma_m{0.01};                 ///< horizontally; twice that in height
+  std::function<double(double)> claimed_share;  ///< of it, at a time; may be empty: 1
   double lio_walk_m_per_sqrt_m{0.007};
   double lio_scale{0.0005};                             ///< LIO's way is longer by this share
   Eigen::Vector3d lio_jump_m{Eigen::Vector3d::Zero()};  ///< of odom against map during an outage
@@ -205,7 +208,8 @@ class LyingDrive {
   Pose T_odom_base() const { return {from_yaw(heading_rad_ - s_.T_map_odom.yaw_rad), p_odom_m_}; }
 
   Eigen::Vector3d claimed_m() const {
-    return {s_.claimed_sigma_m, s_.claimed_sigma_m, 2.0 * s_.claimed_sigma_m};
+    const double sigma_m = s_.claimed_sigma_m * (s_.claimed_share ? s_.claimed_share(now_s_) : 1.0);
+    return {sigma_m, sigma_m, 2.0 * sigma_m};
   }
 
   bool fixes_now() const { return !s_.has_fix || s_.has_fix(now_s_); }
@@ -233,7 +237,7 @@ class LyingDrive {
     GnssFix raw;
     raw.stamp_ns = stamp(now_s_);
     raw.status = FixStatus::kGbas;
-    const geodesy::Geographic place = frame_.to_geographic(antenna_m);
+    const geodesy::Geographic place = frame_.to_geographic(as_received(antenna_m));
     raw.latitude_deg = place.latitude_deg;
     raw.longitude_deg = place.longitude_deg;
     raw.altitude_m = place.height_m;
@@ -248,6 +252,16 @@ class LyingDrive {
     const double delay_s = s_.delay_s ? s_.delay_s(fixes_.size()) : 0.0;
     fixes_.push_back(std::llround(now_s_ / kTick_s));
     waiting_.emplace(now_s_ + s_.fix_latency_s + delay_s, Waiting{raw, record});
+  }
+
+  Eigen::Vector3d as_received(Eigen::Vector3d antenna_m) {
+    if (s_.raw_lie_enu_m) {
+      antenna_m += s_.raw_lie_enu_m(now_s_);
+    }
+    if (s_.raw_grid_m > 0.0) {
+      antenna_m.head<2>() = (antenna_m.head<2>() / s_.raw_grid_m).array().round() * s_.raw_grid_m;
+    }
+    return antenna_m;
   }
 
   void deliver() {

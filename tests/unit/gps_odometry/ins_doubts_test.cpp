@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
+#include <optional>
 #include <random>
 
 namespace trigpoint::gps_odometry {
@@ -130,6 +131,138 @@ TEST(InsDoubts, are_none_of_fixes_that_lie_on_a_grid_of_a_metre) {
     std::printf("fixes on a grid of a metre: worst error %.2f m\n", found.error_m);
     EXPECT_LT(found.error_m, 2.0) << "seed " << seed;
   }
+}
+
+/// What became of the fix at a time; it must have been told of.
+bool was_accepted(const Recorded& result, double time_s) {
+  std::optional<bool> accepted;
+  for (const GpsStatus& status : result.statuses) {
+    for (const FixRecord& record : status.recent_fixes) {
+      if (std::abs(to_seconds(record.stamp_ns - kEpoch_ns) - time_s) < 1e-3) {
+        accepted = record.accepted;
+      }
+    }
+  }
+  EXPECT_TRUE(accepted.has_value()) << time_s;
+  return accepted.value_or(false);
+}
+
+void move_north(GnssFix& fix, double off_m) {
+  fix.latitude_deg += off_m / kDegree_m;
+}
+
+/// By 40 m more every second, there and back.
+double jumping_m(double time_s) {
+  return 40.0 * (1.0 + std::fmod(std::floor(time_s), 2.0));
+}
+
+/// A receiver whose position is useless need not be wrong about the height: a step of it is the
+/// receiver's, as ever, and not the end of an outage.
+TEST(InsDoubts, judge_heights_as_ever_while_the_position_of_the_fixes_is_not_used) {
+  const auto truth = drive(steadily(1.5), 110.0);
+  const auto inputs = with_fixes(sense(truth, cheap_robot(1), 1), [](double time_s, GnssFix& fix) {
+    if (time_s > 60.0 && time_s < 100.0) {
+      move_north(fix, jumping_m(time_s));
+      fix.altitude_m += time_s > 75.0 && time_s < 85.0 ? 3.0 : 0.0;
+    }
+    return true;
+  });
+  GpsOdometry filter(config_with_datum("eskf18"), cheap_robot(1).robot);
+  const Recorded result = run(filter, inputs, truth);
+  double worst_m = 0.0;
+  double most_sigma_m = 0.0;
+  double least_sigma_m = 1.0;
+  for (const Sample& sample : result.samples) {
+    if (sample.time_s > 65.0 && sample.time_s < 100.0) {
+      worst_m = std::max(worst_m, std::abs(sample.error_m.z()));
+      most_sigma_m = std::max(most_sigma_m, sample.sigma_m.z());
+      least_sigma_m = std::min(least_sigma_m, sample.sigma_m.z());
+    }
+  }
+  std::printf("a height of 3 m more for 10 s: %.2f m off, sigma %.3f to %.3f m\n",
+              worst_m,
+              least_sigma_m,
+              most_sigma_m);
+  EXPECT_LT(worst_m, 0.3);
+}
+
+/// The strapdown's sigma after some seconds of silence allows for most steps.
+TEST(InsDoubts, do_not_end_because_the_receiver_was_silent) {
+  const auto truth = drive(steadily(1.5), 90.0);
+  const auto inputs = with_fixes(sense(truth, cheap_robot(1), 1), [](double time_s, GnssFix& fix) {
+    if (time_s > 60.0 && time_s < 66.0) {
+      move_north(fix, jumping_m(time_s));
+    } else if (time_s > 60.0) {
+      move_north(fix, 79.0);
+    }
+    return time_s < 66.0 || time_s > 72.0;
+  });
+  GpsOdometry filter(config_with_datum("eskf18"), cheap_robot(1).robot);
+  const Recorded result = run(filter, inputs, truth);
+  EXPECT_FALSE(was_accepted(result, 65.8));
+  EXPECT_FALSE(was_accepted(result, 72.2));
+  EXPECT_FALSE(was_accepted(result, 76.0));
+  EXPECT_TRUE(was_accepted(result, 79.0)) << "it holds still";
+  EXPECT_LT(horizontal(result, 79.0, 90.0).error_m, 5.0);
+}
+
+/// Three fixes of one kind of solution say nothing about the first one of another kind.
+TEST(InsDoubts, begin_anew_with_another_kind_of_solution) {
+  const auto truth = drive(steadily(1.5), 80.0);
+  const auto inputs = with_fixes(sense(truth, cheap_robot(1), 1), [](double time_s, GnssFix& fix) {
+    move_north(fix, time_s < 59.9 ? 0.0 : time_s < 62.1 ? 3.0 : time_s < 62.7 ? 6.0 : 9.0);
+    fix.covariance_enu_m2 *= time_s < 62.7 ? 1.0 : 9.0;
+    return true;
+  });
+  GpsOdometry filter(config_with_datum("eskf18"), cheap_robot(1).robot);
+  const Recorded result = run(filter, inputs, truth);
+  EXPECT_TRUE(was_accepted(result, 60.4)) << "the third one is absorbed";
+  EXPECT_FALSE(was_accepted(result, 62.6)) << "it jumped again";
+  EXPECT_FALSE(was_accepted(result, 62.8));
+  EXPECT_FALSE(was_accepted(result, 63.0));
+  EXPECT_TRUE(was_accepted(result, 63.2));
+}
+
+/// Of a receiver whose steps are coarser than it says.
+TEST(InsDoubts, end_where_coarse_fixes_are_steady_within_what_they_scatter) {
+  constexpr double kGrid_deg = 5e-6;
+  const auto truth = drive(circle(2.0, 0.133, 2.5), 110.0);
+  const auto inputs = with_fixes(sense(truth, Sensors{}, 1), [](double time_s, GnssFix& fix) {
+    if (time_s > 60.0 && time_s < 70.0) {
+      move_north(fix, jumping_m(time_s));
+    }
+    fix.latitude_deg = std::round(fix.latitude_deg / kGrid_deg) * kGrid_deg;
+    fix.longitude_deg = std::round(fix.longitude_deg / kGrid_deg) * kGrid_deg;
+    return true;
+  });
+  GpsOdometry filter(config_with_datum("eskf18"), RobotConfig{});
+  const Recorded result = run(filter, inputs, truth);
+  int accepted = 0;
+  for (double time_s = 80.0; time_s < 90.0; time_s += 0.2) {
+    accepted += was_accepted(result, time_s) ? 1 : 0;
+  }
+  std::printf("coarse fixes after jumps: %d of 50 accepted, %.2f m\n",
+              accepted,
+              horizontal(result, 80.0, 110.0).error_m);
+  EXPECT_FALSE(was_accepted(result, 69.0));
+  EXPECT_GE(accepted, 45);
+}
+
+/// One fix in four seconds, where a silence is longer than that.
+TEST(InsDoubts, know_a_slow_receiver_that_jumps_again_and_again) {
+  Config config = config_with_datum("eskf18");
+  config.eskf18.suspect_outage_s = 15.0;
+  Sensors sensors = cheap_robot(1);
+  sensors.fix_hz = 0.25;
+  const auto truth = drive(steadily(1.5), 150.0);
+  const auto inputs = with_fixes(sense(truth, sensors, 1), [&](double time_s, GnssFix& fix) {
+    move_north(fix, time_s < 99.0 ? 0.0 : jumping_m((time_s - 99.0) / 12.0));
+    return true;
+  });
+  GpsOdometry filter(config, sensors.robot);
+  const Recorded result = run(filter, inputs, truth);
+  EXPECT_TRUE(was_accepted(result, 108.0)) << "the third one is absorbed";
+  EXPECT_FALSE(was_accepted(result, 120.0)) << "it jumped again";
 }
 
 }  // namespace

@@ -19,6 +19,11 @@ struct AcceptedFix {
   bool is_recorded{false};  ///< told of in a record of its own
 };
 
+/// Its variance along east or north, whichever is larger.
+inline double level_m2(const AcceptedFix& fix) {
+  return fix.covariance_map_m2.diagonal().head<2>().maxCoeff();
+}
+
 /// A receiver that says less than this share of the filter's variance is not believed more.
 inline constexpr double kLeastShare = 0.1;
 

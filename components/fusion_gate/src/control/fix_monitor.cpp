@@ -8,6 +8,7 @@
 #include "fusion/rows.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <numeric>
 #include <vector>
 
@@ -22,6 +23,7 @@ constexpr double kScatterWindow_s = 30.0;
 constexpr std::size_t kScatterFixes = 10;
 constexpr double kNewSolution_s = 5.0;  // after such a silence the receiver began anew
 constexpr double kJump_s = 1.0;
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr std::size_t kRefusedKept = 32;
 // An alignment that was confirmed is given up only for fixes that agree against it for much longer.
 constexpr double kLongContradiction_s = 120.0;
@@ -253,6 +255,9 @@ double FixMonitor::worth_of_doubted_m2(const Witness& witness,
   }
   double worst_m2 = 0.0;
   for (const Difference& difference : differences) {
+    if (!difference.d_map_m.allFinite() || !difference.covariance_m2.allFinite()) {
+      return kInfinite;
+    }
     const Eigen::Vector3d explained_m2 = difference.covariance_m2.diagonal();
     const Eigen::Vector3d excess_m2 = (difference.d_map_m.cwiseAbs2() - explained_m2).cwiseMax(0.0);
     worst_m2 = std::max(worst_m2, excess_m2.head<2>().sum());
@@ -321,7 +326,7 @@ MonitorOutcome FixMonitor::judge(const Witness& witness, const LioStatus& lio) {
     const double since_s = to_seconds(sighting.stamp_ns - last_trusted_[0]->stamp_ns);
     confirmed_s_ += since_s <= kUnbrokenGap_s ? std::max(0.0, since_s) : 0.0;
   }
-  doubted_m2_ = outcome.trusted[0] ? kNaN : worth_of_doubted_m2(witness, sighting, lio);
+  doubted_m2_ = outcome.trusted[0] ? kInfinite : worth_of_doubted_m2(witness, sighting, lio);
   note_trusted(witness, sighting, lio, outcome);
   for (const Part part : kParts) {
     if (outcome.trusted[index_of(part)]) {
@@ -427,7 +432,7 @@ void FixMonitor::begin_anew() {
   refused_.clear();
   confirmed_s_ = 0.0;
   crept_ = {};
-  doubted_m2_ = kNaN;
+  doubted_m2_ = kInfinite;
 }
 
 }  // namespace trigpoint::fusion_gate

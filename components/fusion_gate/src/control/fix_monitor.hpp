@@ -15,6 +15,7 @@
 
 #include <array>
 #include <deque>
+#include <limits>
 #include <optional>
 
 namespace trigpoint::fusion_gate {
@@ -93,7 +94,8 @@ class FixMonitor {
 
   /// What the doubted fix that was judged last is worth, along any axis of the level: the
   /// receiver's own variance and what it is off beyond what LIO explains. A receiver that lies
-  /// along an axis that LIO sees lies no less along one that it does not see.
+  /// along an axis that LIO sees lies no less along one that it does not see. Infinite where no fix
+  /// was doubted, or what it is off cannot be told.
   double doubted_variance_m2() const { return doubted_m2_; }
 
   /// A new alignment is in force, or a new odom epoch: nothing of before can be compared.
@@ -151,7 +153,7 @@ class FixMonitor {
   // By how much trusted fixes are still off T_map_odom: believed, and not yet taken in.
   Eigen::Vector3d unsettled_m2_{Eigen::Vector3d::Zero()};
   Settling settling_;
-  double doubted_m2_{kNaN};
+  double doubted_m2_{std::numeric_limits<double>::infinity()};
   std::deque<Sighting> refused_;  // by the filter, since a fix was judged
   double confirmed_s_{0.0};       // time for which fixes confirmed the alignment
   std::array<bool, 2> crept_{};   // by part: the doubt began with a displacement, not with a jump

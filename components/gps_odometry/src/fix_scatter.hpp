@@ -6,7 +6,7 @@
 #include <array>
 #include <cstddef>
 
-namespace trigpoint {
+namespace trigpoint::gps_odometry {
 
 /// Between two fixes of a receiver a strapdown or a LIO knows the way to centimetres, and an error
 /// that is slow in the receiver does not change. What is left of their difference is new in each of
@@ -35,4 +35,4 @@ class FixScatter {
   std::size_t added_{0};
 };
 
-}  // namespace trigpoint
+}  // namespace trigpoint::gps_odometry

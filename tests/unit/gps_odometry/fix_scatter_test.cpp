@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
-#include "trigpoint/base/fix_scatter.hpp"
+#include "fix_scatter.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-namespace trigpoint {
+namespace trigpoint::gps_odometry {
 namespace {
 
 constexpr double kSaid_m2 = 0.02 * 0.02;  // of one fix along one axis
@@ -97,4 +97,4 @@ TEST(FixScatter, says_nothing_after_a_few_fixes_and_of_what_the_way_does_not_tel
 }
 
 }  // namespace
-}  // namespace trigpoint
+}  // namespace trigpoint::gps_odometry

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the Trigpoint developers
-#include "trigpoint/base/fix_scatter.hpp"
+#include "fix_scatter.hpp"
 
 #include <algorithm>
 
-namespace trigpoint {
+namespace trigpoint::gps_odometry {
 
 namespace {
 
@@ -43,4 +43,4 @@ double FixScatter::factor(int axes) const {
   return measured > chance ? measured : 1.0;
 }
 
-}  // namespace trigpoint
+}  // namespace trigpoint::gps_odometry
