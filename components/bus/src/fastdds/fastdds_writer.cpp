@@ -2,6 +2,7 @@
 // Copyright the Trigpoint developers
 #include "fastdds_writer.hpp"
 
+#include "bulk_queue.hpp"
 #include "endpoint.hpp"
 #include "transport.hpp"
 #include "wire_type.hpp"
@@ -15,6 +16,17 @@ namespace dds = eprosima::fastdds::dds;
 
 namespace {
 
+/// Cyclone DDS asks for 256 fragments at a heartbeat, of clouds that have thousands.
+constexpr double kRoundsOfRepair = 5.0;
+
+EntityNumber entity_number(const dds::DataWriter& writer) {
+  EntityNumber number = 0;
+  for (const auto byte : writer.guid().entityId.value) {
+    number = (number << 8) | byte;
+  }
+  return number;
+}
+
 dds::DataWriterQos writer_qos(const FastNode& node, const Qos& qos, const backend::TypeOps& type) {
   dds::DataWriterQos result;
   set_policies(result, qos, type);
@@ -23,7 +35,15 @@ dds::DataWriterQos writer_qos(const FastNode& node, const Qos& qos, const backen
   // What is missing is sent at once: many short repairs follow each other on a long way.
   result.reliable_writer_qos().times.nackResponseDelay = eprosima::fastrtps::Duration_t(0, 0);
   result.publish_mode().kind = dds::SYNCHRONOUS_PUBLISH_MODE;
-  if (qos.bulk && node.is_paced()) {
+  if (!qos.bulk || !node.is_paced()) {
+    return result;
+  }
+  // Else each fragment has a heartbeat with it as soon as the history is full.
+  result.reliable_writer_qos().disable_heartbeat_piggyback = true;
+  if (node.bulk_queue() != nullptr) {
+    result.reliable_writer_qos().times.heartbeatPeriod =
+        eprosima::fastrtps::Duration_t(node.config().heartbeat_s / kRoundsOfRepair);
+  } else {
     result.publish_mode().kind = dds::ASYNCHRONOUS_PUBLISH_MODE;
     result.publish_mode().flow_controller_name = kPacing;
   }
@@ -58,6 +78,10 @@ FastWriter::FastWriter(FastNode& node,
   if (!qos.bulk || node.is_paced()) {
     keep_what_is_acknowledged(*writer_);
   }
+  if (qos.bulk && node.bulk_queue() != nullptr) {
+    bulk_queue_ = node.bulk_queue();
+    bulk_queue_->add_writer(entity_number(*writer_), static_cast<std::size_t>(qos.depth));
+  }
 }
 
 FastWriter::~FastWriter() {
@@ -70,6 +94,9 @@ FastWriter::~FastWriter() {
   // which then counts missing ones for ever.
   std::size_t removed = 0;
   writer_->clear_history(&removed);
+  if (bulk_queue_ != nullptr) {
+    bulk_queue_->remove_writer(entity_number(*writer_));
+  }
   node_.publisher().delete_datawriter(writer_);
 }
 
@@ -77,6 +104,7 @@ bool FastWriter::write(const void* value) {
   WireSample sample;
   sample.ops = &type_;
   sample.written = value;
+  const BulkQueue::NewSample is_new;
   return writer_->write(&sample);
 }
 
