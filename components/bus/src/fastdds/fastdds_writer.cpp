@@ -54,8 +54,11 @@ dds::DataWriterQos writer_qos(const FastNode& node, const Qos& qos, const backen
 /// not acknowledged, and holds the writer's list of readers meanwhile. If some of it is being
 /// repaired it waits for the flow controller, whose thread waits for that list: the process hangs
 /// for ever (Fast DDS #3468, #5432). So what is acknowledged stays until `depth` newer samples are
-/// there. What is announced and what late joiners get was settled when the writer was made; from
-/// then on only that removal asks for the durability, and no function may change it.
+/// there. What is announced and what late joiners get is settled when the writer is enabled; from
+/// then on only that removal asks for the durability, and no function may change it: neither
+/// set_qos() nor a publisher that does not enable its writers, since enable() takes all three from
+/// the same value. The removal is of a sample, so no other thread reads the value before the first
+/// write() of ours, which comes later and through the writer's mutex.
 void keep_what_is_acknowledged(dds::DataWriter& writer) {
   const_cast<dds::DataWriterQos&>(writer.get_qos()).durability().kind =
       dds::TRANSIENT_LOCAL_DURABILITY_QOS;
