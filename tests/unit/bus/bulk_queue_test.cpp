@@ -168,6 +168,27 @@ TEST_F(Bulk, counts_a_datagram_once_that_leaves_from_two_sockets) {
   EXPECT_LT(std::chrono::steady_clock::now() - begin, 100ms);
 }
 
+TEST_F(Bulk, catches_up_when_it_was_held_up) {
+  for (const auto catches_up : {0ms, 2000ms}) {
+    Socket slow;
+    BulkQueue late(Pacing{2 * kDatagram_bytes, 200ms}, catches_up);
+    late.add_writer(kClouds, kDepth);
+    const auto send = [&](std::uint8_t number, std::uint8_t fragments) {
+      const BulkQueue::NewSample is_new;
+      for (std::uint8_t i = 0; i < fragments; ++i) {
+        late.send(slow, piece(kClouds, number, i), to);
+      }
+    };
+    send(1, 2);
+    ASSERT_TRUE(slow.has_sent(2));
+    std::this_thread::sleep_for(700ms);  // of three periods nothing was sent
+    send(2, 6);
+    std::this_thread::sleep_for(100ms);
+    EXPECT_EQ(slow.sent().size(), catches_up == 0ms ? 4U : 8U);
+    late.stop();
+  }
+}
+
 TEST_F(Bulk, of_more_clouds_than_may_wait_drops_the_oldest) {
   write(1, 2);
   ASSERT_TRUE(socket.has_sent(2));

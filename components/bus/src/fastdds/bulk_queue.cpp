@@ -57,7 +57,8 @@ BulkQueue::NewSample::~NewSample() {
   writes_new_sample = false;
 }
 
-BulkQueue::BulkQueue(const Pacing& pacing) : pacing_(pacing), thread_([this] { work(); }) {}
+BulkQueue::BulkQueue(const Pacing& pacing, std::chrono::milliseconds catches_up)
+    : pacing_(pacing), catches_up_(catches_up), thread_([this] { work(); }) {}
 
 BulkQueue::~BulkQueue() {
   stop();
@@ -169,6 +170,16 @@ BulkQueue::Datagram BulkQueue::next() {
   return datagram;
 }
 
+void BulkQueue::begin_period_if_due() {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < period_end_) {
+    return;
+  }
+  period_end_ = (now - period_end_ <= catches_up_ ? period_end_ : now) + pacing_.period;
+  sent_bytes_ = 0;
+  repaired_bytes_ = 0;
+}
+
 void BulkQueue::work() {
   std::unique_lock lock(mutex_);
   while (true) {
@@ -176,12 +187,7 @@ void BulkQueue::work() {
     if (stopped_) {
       return;
     }
-    const auto now = std::chrono::steady_clock::now();
-    if (now >= period_end_) {
-      period_end_ = now + pacing_.period;
-      sent_bytes_ = 0;
-      repaired_bytes_ = 0;
-    }
+    begin_period_if_due();
     const auto& first = may_send_repair() ? repairs_.front() : new_.front();
     const auto size = static_cast<std::int64_t>(first.bytes.size());
     if (sent_bytes_ > 0 && sent_bytes_ + size > pacing_.portion_bytes) {

@@ -25,7 +25,9 @@ namespace trigpoint::bus::fastdds {
 /// clouds do not stop when much is asked for.
 class BulkQueue {
  public:
-  explicit BulkQueue(const Pacing& pacing);
+  /// A period of which its thread is late, up to `catches_up`, is made up for at once: else a busy
+  /// computer sends too little.
+  explicit BulkQueue(const Pacing& pacing, std::chrono::milliseconds catches_up = {});
   ~BulkQueue();
 
   /// Nothing waits any longer, and all is sent at once: before sockets are closed.
@@ -72,10 +74,12 @@ class BulkQueue {
   void add_new(Datagram&& datagram, Writer& writer);
   void drop_new(EntityNumber writer, std::uint64_t number);
   bool may_send_repair() const;
+  void begin_period_if_due();
   Datagram next();
   void work();
 
   const Pacing pacing_;
+  const std::chrono::milliseconds catches_up_;
   std::mutex mutex_;  ///< of all below, and held while a datagram is sent
   std::condition_variable changed_;
   bool stopped_{false};

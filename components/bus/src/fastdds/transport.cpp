@@ -120,7 +120,9 @@ std::shared_ptr<BulkQueue> make_bulk_queue(const Config& config, const SocketBuf
   if (!pacing || !config.security_folder.empty() || config.shared_memory) {
     return nullptr;
   }
-  return std::make_shared<BulkQueue>(*pacing);
+  constexpr std::chrono::milliseconds kCatchesUp{20};  // a cloud's fifth
+  return std::make_shared<BulkQueue>(*pacing,
+                                     is_small(buffers) ? std::chrono::milliseconds{0} : kCatchesUp);
 }
 
 void set_transport(eprosima::fastdds::dds::DomainParticipantQos& qos,
