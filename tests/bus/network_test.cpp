@@ -143,15 +143,17 @@ TEST(SmallBuffers, still_carry_every_two_megabyte_cloud_and_imu_sample) {
   EXPECT_EQ(imu_heard, imu_sent);
 }
 
-TEST(PacedWriter, goes_on_when_readers_leave_in_the_middle_of_a_cloud) {
-  constexpr int kLeaving = 60;
+/// `shared_memory` is the writer's only, so that its clouds go over UDP all the same.
+void expect_goes_on_when_readers_leave(int leaving_readers, bool shared_memory) {
   Config config = own_domain();
   config.datagram_bytes = 1472;
   config.heartbeat_s = 0.01;
   config.bulk_bytes_per_s = 1'000'000'000;
   Config lossy = config;  // much is lost, so that repairs are under way when the reader leaves
   lossy.socket_buffer_bytes = 131'072;
-  Participant sensors(config, "sensors");
+  Config writing_config = config;
+  writing_config.shared_memory = shared_memory;
+  Participant sensors(writing_config, "sensors");
   Participant mapper(config, "mapper");
   Participant other(lossy, "other");
   Publisher clouds(sensors, topics::points);
@@ -169,7 +171,7 @@ TEST(PacedWriter, goes_on_when_readers_leave_in_the_middle_of_a_cloud) {
       ++written;
     }
   });
-  for (int i = 0; i < kLeaving; ++i) {
+  for (int i = 0; i < leaving_readers; ++i) {
     {
       const Subscription<sensor_msgs::msg::PointCloud2> leaving(
           other, topics::points, [](const auto&, const MessageInfo&) {});
@@ -188,6 +190,18 @@ TEST(PacedWriter, goes_on_when_readers_leave_in_the_middle_of_a_cloud) {
   ended = true;
   writing.join();
   EXPECT_GT(staying_heard.size(), 0U);
+}
+
+TEST(PacedWriter, goes_on_when_readers_leave_in_the_middle_of_a_cloud) {
+  expect_goes_on_when_readers_leave(30, false);
+}
+
+// With shared memory, as with security, Fast DDS's own flow controller paces.
+TEST(PacedWriter, goes_on_when_readers_leave_and_the_middleware_paces) {
+  if (std::string(backend::name()) != "fastdds") {
+    GTEST_SKIP() << "Fast DDS only";
+  }
+  expect_goes_on_when_readers_leave(60, true);
 }
 
 /// Files in /dev/shm that this process has mapped.

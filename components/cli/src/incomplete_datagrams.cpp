@@ -51,10 +51,24 @@ std::string reassembly_advice(std::optional<std::int64_t> before,
     return "";
   }
   return std::to_string(*after - *before) +
-         " datagrams came in pieces of which some were lost, and the kernel gave them up: they are "
-         "larger than a network frame. For our programs set bus.datagram_bytes: 1472 "
+         " datagrams came in pieces of which some were lost, and the kernel gave them up while "
+         "this "
+         "listened (ReasmFails " +
+         std::to_string(*before) + " before, " + std::to_string(*after) +
+         " after): they are larger than a network frame. For our programs set bus.datagram_bytes: "
+         "1472 "
          "(bringup/profiles/lan.yaml) on the computer that sends; for others that cannot, on this "
          "one: sysctl -w net.ipv4.ipfrag_time=1 net.ipv4.ipfrag_high_thresh=67108864";
+}
+
+std::string past_reassembly_note(std::optional<std::int64_t> before,
+                                 std::optional<std::int64_t> after) {
+  if (!before || !after || *before == 0 || *after != *before) {
+    return "";
+  }
+  return "the kernel gave up " + std::to_string(*before) +
+         " datagrams of which pieces were lost, but none while this listened (ReasmFails " +
+         std::to_string(*before) + " before and after)";
 }
 
 }  // namespace trigpoint::cli

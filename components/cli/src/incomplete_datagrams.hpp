@@ -18,8 +18,14 @@ std::optional<std::int64_t> failed_reassemblies(std::istream& snmp);
 /// The same, from the kernel.
 std::optional<std::int64_t> failed_reassemblies();
 
-/// What to say when `before` and `after` listening differ; empty when they do not or are not known.
+/// What is wrong when `before` and `after` listening differ; empty when they do not or are not
+/// known. What was sent up to 30 s before counts only when the kernel loses its patience.
 std::string reassembly_advice(std::optional<std::int64_t> before,
                               std::optional<std::int64_t> after);
+
+/// What is to be known, and no fault of now, when there were some before and none since; else
+/// empty.
+std::string past_reassembly_note(std::optional<std::int64_t> before,
+                                 std::optional<std::int64_t> after);
 
 }  // namespace trigpoint::cli

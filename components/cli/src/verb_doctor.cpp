@@ -60,9 +60,12 @@ void tell_socket_buffer_limit() {
   }
 }
 
-/// Since `failed_before` was asked for; 1 when there were some.
+/// 1 when there were some since `failed_before` was asked for; older ones are told only.
 int tell_incomplete_datagrams(std::optional<std::int64_t> failed_before) {
-  const std::string advice = reassembly_advice(failed_before, failed_reassemblies());
+  const auto failed_after = failed_reassemblies();
+  const std::string note = past_reassembly_note(failed_before, failed_after);
+  std::cout << (note.empty() ? "" : "  " + note + "\n");
+  const std::string advice = reassembly_advice(failed_before, failed_after);
   return advice.empty() ? 0 : tell("the network", {advice});
 }
 

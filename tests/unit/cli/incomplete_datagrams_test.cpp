@@ -33,11 +33,21 @@ TEST(IncompleteDatagrams, are_unknown_where_the_kernel_does_not_tell) {
 TEST(IncompleteDatagrams, are_told_with_the_remedy_when_there_are_more_than_before) {
   EXPECT_THAT(reassembly_advice(3, 20),
               AllOf(HasSubstr("17 datagrams"),
+                    HasSubstr("3 before, 20 after"),
                     HasSubstr("bus.datagram_bytes: 1472"),
                     HasSubstr("net.ipv4.ipfrag_high_thresh")));
   EXPECT_EQ(reassembly_advice(20, 20), "");
   EXPECT_EQ(reassembly_advice(std::nullopt, 20), "");
   EXPECT_EQ(reassembly_advice(3, std::nullopt), "");
+}
+
+TEST(IncompleteDatagrams, of_the_past_are_told_and_no_finding) {
+  EXPECT_EQ(reassembly_advice(20, 20), "");
+  EXPECT_THAT(past_reassembly_note(20, 20), HasSubstr("20 before and after"));
+  EXPECT_EQ(past_reassembly_note(3, 20), "");
+  EXPECT_EQ(past_reassembly_note(0, 0), "");
+  EXPECT_EQ(past_reassembly_note(std::nullopt, 20), "");
+  EXPECT_EQ(past_reassembly_note(3, std::nullopt), "");
 }
 
 }  // namespace

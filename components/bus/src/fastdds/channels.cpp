@@ -30,7 +30,8 @@ bool serves(Reach reach, const Locator_t& destination) {
   if (reach == Reach::kAll || IPLocator::isMulticast(destination)) {
     return true;
   }
-  return IPLocator::isLocal(destination) == (reach == Reach::kLoopback);
+  return reach != Reach::kMulticast &&
+         IPLocator::isLocal(destination) == (reach == Reach::kLoopback);
 }
 
 Reach Channels::reach_of(const SenderResource& channel) {
@@ -41,6 +42,10 @@ Reach Channels::reach_of(const SenderResource& channel) {
   if (known == known_.end()) {
     known = known_.insert(known_.end(), {&channel, reach_from(channel)});
     are_others_served_ = are_others_served_ || known->second == Reach::kInterface;
+    are_all_served_ = are_all_served_ || known->second == Reach::kAll;
+  }
+  if (are_all_served_ && known->second != Reach::kAll) {
+    return Reach::kMulticast;
   }
   const bool serves_all = known->second == Reach::kLoopback && !are_others_served_;
   return serves_all ? Reach::kAll : known->second;

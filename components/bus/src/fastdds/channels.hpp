@@ -18,12 +18,14 @@ enum class Reach {
   kAll,        ///< any address
   kLoopback,   ///< 127.0.0.1: this computer, still there when the cable is not
   kInterface,  ///< the address of an interface: everybody else
+  kMulticast,  ///< of an interface, beside a socket on any address
 };
 
 /// Multicast leaves from every socket.
 bool serves(Reach reach, const eprosima::fastrtps::rtps::Locator_t& destination);
 
-/// The sockets of one transport. May be asked by several threads.
+/// The sockets of one transport, which Fast DDS closes with the transport and not before: no other
+/// ever has the address of one that was seen. May be asked by several threads.
 class Channels {
  public:
   /// Of a socket on 127.0.0.1 kAll as long as there is none of another interface.
@@ -32,6 +34,7 @@ class Channels {
  private:
   std::mutex mutex_;
   bool are_others_served_{false};
+  bool are_all_served_{false};
   std::vector<std::pair<const eprosima::fastrtps::rtps::SenderResource*, Reach>> known_;
 };
 

@@ -6,6 +6,7 @@
 
 #include "../network.hpp"
 #include "../process_note.hpp"
+#include "bulk_queue.hpp"
 #include "endpoint.hpp"
 #include "fastdds_reader.hpp"
 #include "fastdds_writer.hpp"
@@ -52,7 +53,8 @@ FastNode::FastNode(const Config& config, const std::string& name, EventSink sink
   qos.name(name);
   const std::string note = process_note();
   qos.user_data().data_vec({note.begin(), note.end()});
-  set_transport(qos, config, buffers);
+  bulk_queue_ = make_bulk_queue(config, buffers);
+  set_transport(qos, config, buffers, bulk_queue_);
   set_security(qos, config);
   const HandshakeRoom room(config);
   const int domain = domain_of(config);
@@ -68,6 +70,9 @@ FastNode::FastNode(const Config& config, const std::string& name, EventSink sink
 FastNode::~FastNode() {
   participant_->set_listener(nullptr);
   participant_->delete_contained_entities();
+  if (bulk_queue_ != nullptr) {
+    bulk_queue_->stop();
+  }
   dds::DomainParticipantFactory::get_instance()->delete_participant(participant_);
 }
 

@@ -11,9 +11,12 @@
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 
 #include <map>
+#include <memory>
 #include <mutex>
 
 namespace trigpoint::bus::fastdds {
+
+class BulkQueue;
 
 class FastNode : public backend::Node, private eprosima::fastdds::dds::DomainParticipantListener {
  public:
@@ -42,6 +45,9 @@ class FastNode : public backend::Node, private eprosima::fastdds::dds::DomainPar
 
   bool is_paced() const { return is_paced_; }
 
+  /// Nothing when clouds are not paced, or by Fast DDS.
+  BulkQueue* bulk_queue() const { return bulk_queue_.get(); }
+
   void tell(const Event& event) const;
 
  private:
@@ -61,6 +67,7 @@ class FastNode : public backend::Node, private eprosima::fastdds::dds::DomainPar
   const Config config_;
   const EventSink sink_;
   bool is_paced_{false};
+  std::shared_ptr<BulkQueue> bulk_queue_;
   std::mutex discovery_mutex_;
   std::map<std::string, unsigned> processes_;            ///< by the participant's part of a GUID
   std::map<std::string, DiscoveredEndpoint> endpoints_;  ///< by GUID

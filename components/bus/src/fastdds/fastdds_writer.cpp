@@ -2,6 +2,7 @@
 // Copyright the Trigpoint developers
 #include "fastdds_writer.hpp"
 
+#include "bulk_queue.hpp"
 #include "endpoint.hpp"
 #include "transport.hpp"
 #include "wire_type.hpp"
@@ -15,6 +16,17 @@ namespace dds = eprosima::fastdds::dds;
 
 namespace {
 
+/// Cyclone DDS asks for 256 fragments at a heartbeat, of clouds that have thousands.
+constexpr double kRoundsOfRepair = 5.0;
+
+EntityNumber entity_number(const dds::DataWriter& writer) {
+  EntityNumber number = 0;
+  for (const auto byte : writer.guid().entityId.value) {
+    number = (number << 8) | byte;
+  }
+  return number;
+}
+
 dds::DataWriterQos writer_qos(const FastNode& node, const Qos& qos, const backend::TypeOps& type) {
   dds::DataWriterQos result;
   set_policies(result, qos, type);
@@ -23,7 +35,15 @@ dds::DataWriterQos writer_qos(const FastNode& node, const Qos& qos, const backen
   // What is missing is sent at once: many short repairs follow each other on a long way.
   result.reliable_writer_qos().times.nackResponseDelay = eprosima::fastrtps::Duration_t(0, 0);
   result.publish_mode().kind = dds::SYNCHRONOUS_PUBLISH_MODE;
-  if (qos.bulk && node.is_paced()) {
+  if (!qos.bulk || !node.is_paced()) {
+    return result;
+  }
+  // Else each fragment has a heartbeat with it as soon as the history is full.
+  result.reliable_writer_qos().disable_heartbeat_piggyback = true;
+  if (node.bulk_queue() != nullptr) {
+    result.reliable_writer_qos().times.heartbeatPeriod =
+        eprosima::fastrtps::Duration_t(node.config().heartbeat_s / kRoundsOfRepair);
+  } else {
     result.publish_mode().kind = dds::ASYNCHRONOUS_PUBLISH_MODE;
     result.publish_mode().flow_controller_name = kPacing;
   }
@@ -34,8 +54,11 @@ dds::DataWriterQos writer_qos(const FastNode& node, const Qos& qos, const backen
 /// not acknowledged, and holds the writer's list of readers meanwhile. If some of it is being
 /// repaired it waits for the flow controller, whose thread waits for that list: the process hangs
 /// for ever (Fast DDS #3468, #5432). So what is acknowledged stays until `depth` newer samples are
-/// there. What is announced and what late joiners get was settled when the writer was made; from
-/// then on only that removal asks for the durability, and no function may change it.
+/// there. What is announced and what late joiners get is settled when the writer is enabled; from
+/// then on only that removal asks for the durability, and no function may change it: neither
+/// set_qos() nor a publisher that does not enable its writers, since enable() takes all three from
+/// the same value. The removal is of a sample, so no other thread reads the value before the first
+/// write() of ours, which comes later and through the writer's mutex.
 void keep_what_is_acknowledged(dds::DataWriter& writer) {
   const_cast<dds::DataWriterQos&>(writer.get_qos()).durability().kind =
       dds::TRANSIENT_LOCAL_DURABILITY_QOS;
@@ -58,6 +81,10 @@ FastWriter::FastWriter(FastNode& node,
   if (!qos.bulk || node.is_paced()) {
     keep_what_is_acknowledged(*writer_);
   }
+  if (qos.bulk && node.bulk_queue() != nullptr) {
+    bulk_queue_ = node.bulk_queue();
+    bulk_queue_->add_writer(entity_number(*writer_), static_cast<std::size_t>(qos.depth));
+  }
 }
 
 FastWriter::~FastWriter() {
@@ -70,6 +97,9 @@ FastWriter::~FastWriter() {
   // which then counts missing ones for ever.
   std::size_t removed = 0;
   writer_->clear_history(&removed);
+  if (bulk_queue_ != nullptr) {
+    bulk_queue_->remove_writer(entity_number(*writer_));
+  }
   node_.publisher().delete_datawriter(writer_);
 }
 
@@ -77,6 +107,7 @@ bool FastWriter::write(const void* value) {
   WireSample sample;
   sample.ops = &type_;
   sample.written = value;
+  const BulkQueue::NewSample is_new;
   return writer_->write(&sample);
 }
 

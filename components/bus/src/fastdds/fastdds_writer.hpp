@@ -39,6 +39,7 @@ class FastWriter : public backend::Writer, private eprosima::fastdds::dds::DataW
   std::mutex callback_mutex_;
   bool closed_{false};
   eprosima::fastdds::dds::DataWriter* writer_{nullptr};
+  BulkQueue* bulk_queue_{nullptr};  ///< where its samples wait for their turn, if they do
 };
 
 }  // namespace trigpoint::bus::fastdds

@@ -3,6 +3,7 @@
 #include "limited_transport.hpp"
 
 #include "../rtps_limits.hpp"
+#include "bulk_queue.hpp"
 #include "channels.hpp"
 #include <fastdds/rtps/common/LocatorList.hpp>
 #include <fastdds/rtps/network/SenderResource.h>
@@ -23,8 +24,11 @@ using eprosima::fastrtps::rtps::SenderResource;
 
 class LimitedTransport : public rtps::ChainingTransport {
  public:
-  explicit LimitedTransport(const rtps::ChainingTransportDescriptor& descriptor)
-      : ChainingTransport(descriptor), low_level_descriptor_(descriptor.low_level_descriptor) {}
+  LimitedTransport(const rtps::ChainingTransportDescriptor& descriptor,
+                   std::shared_ptr<BulkQueue> bulk)
+      : ChainingTransport(descriptor),
+        low_level_descriptor_(descriptor.low_level_descriptor),
+        bulk_(std::move(bulk)) {}
 
   rtps::TransportDescriptorInterface* get_configuration() override {
     return low_level_descriptor_.get();
@@ -37,7 +41,7 @@ class LimitedTransport : public rtps::ChainingTransport {
             LocatorsIterator* end,
             const std::chrono::steady_clock::time_point& timeout) override {
     const Reach reach = channels_.reach_of(*low_level);
-    if (reach == Reach::kAll) {
+    if (reach == Reach::kAll && bulk_ == nullptr) {
       return low_level->send(bytes, size, begin, end, timeout);
     }
     rtps::LocatorList served;
@@ -46,9 +50,15 @@ class LimitedTransport : public rtps::ChainingTransport {
         served.push_back(*to);
       }
     }
+    if (served.empty()) {
+      return true;
+    }
+    if (bulk_ != nullptr) {
+      return bulk_->send(*low_level, {bytes, size}, served);
+    }
     rtps::Locators first(served.begin());
     rtps::Locators after(served.end());
-    return served.empty() || low_level->send(bytes, size, &first, &after, timeout);
+    return low_level->send(bytes, size, &first, &after, timeout);
   }
 
   void receive(rtps::TransportReceiverInterface* next,
@@ -63,22 +73,29 @@ class LimitedTransport : public rtps::ChainingTransport {
 
  private:
   std::shared_ptr<rtps::TransportDescriptorInterface> low_level_descriptor_;
+  std::shared_ptr<BulkQueue> bulk_;
   Channels channels_;
 };
 
 struct LimitedDescriptor : rtps::ChainingTransportDescriptor {
-  using ChainingTransportDescriptor::ChainingTransportDescriptor;
+  LimitedDescriptor(std::shared_ptr<rtps::TransportDescriptorInterface> low_level,
+                    std::shared_ptr<BulkQueue> bulk)
+      : ChainingTransportDescriptor(std::move(low_level)), bulk_(std::move(bulk)) {}
 
   rtps::TransportInterface* create_transport() const override {
-    return new LimitedTransport(*this);  // Fast DDS owns it
+    return new LimitedTransport(*this, bulk_);  // Fast DDS owns it
   }
+
+ private:
+  std::shared_ptr<BulkQueue> bulk_;
 };
 
 }  // namespace
 
 std::shared_ptr<rtps::TransportDescriptorInterface> limited(
-    std::shared_ptr<rtps::TransportDescriptorInterface> transport) {
-  return std::make_shared<LimitedDescriptor>(std::move(transport));
+    std::shared_ptr<rtps::TransportDescriptorInterface> transport,
+    std::shared_ptr<BulkQueue> bulk) {
+  return std::make_shared<LimitedDescriptor>(std::move(transport), std::move(bulk));
 }
 
 }  // namespace trigpoint::bus::fastdds

@@ -5,6 +5,7 @@
 #include "trigpoint/base/config.hpp"
 
 #include "../network.hpp"
+#include "bulk_queue.hpp"
 #include "limited_transport.hpp"
 #include <fastdds/rtps/flowcontrol/FlowControllerDescriptor.hpp>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
@@ -114,9 +115,20 @@ void add_pacing(eprosima::fastdds::dds::DomainParticipantQos& qos, const Pacing&
 
 }  // namespace
 
+std::shared_ptr<BulkQueue> make_bulk_queue(const Config& config, const SocketBuffers& buffers) {
+  const auto pacing = pacing_of(config, buffers);
+  if (!pacing || !config.security_folder.empty() || config.shared_memory) {
+    return nullptr;
+  }
+  constexpr std::chrono::milliseconds kCatchesUp{20};  // a cloud's fifth
+  return std::make_shared<BulkQueue>(*pacing,
+                                     is_small(buffers) ? std::chrono::milliseconds{0} : kCatchesUp);
+}
+
 void set_transport(eprosima::fastdds::dds::DomainParticipantQos& qos,
                    const Config& config,
-                   const SocketBuffers& buffers) {
+                   const SocketBuffers& buffers,
+                   const std::shared_ptr<BulkQueue>& bulk) {
   auto udp = std::make_shared<Udp>();
   udp->largest_sent_bytes = static_cast<std::uint32_t>(config.datagram_bytes);
   udp->sendBufferSize = static_cast<std::uint32_t>(buffers.send_bytes);
@@ -131,7 +143,7 @@ void set_transport(eprosima::fastdds::dds::DomainParticipantQos& qos,
   // Shared memory stays off unless asked for: it costs seconds of reconnection after a kill and
   // never matches between root and other users (see the README).
   qos.transport().use_builtin_transports = false;
-  qos.transport().user_transports.push_back(limited(udp));
+  qos.transport().user_transports.push_back(limited(udp, bulk));
   if (config.shared_memory) {
     qos.transport().user_transports.push_back(shared_memory());
   }
@@ -143,7 +155,7 @@ void set_transport(eprosima::fastdds::dds::DomainParticipantQos& qos,
   } else {
     use_discovery_server(qos, config);
   }
-  if (const auto pacing = pacing_of(config, buffers)) {
+  if (const auto pacing = pacing_of(config, buffers); pacing && bulk == nullptr) {
     add_pacing(qos, *pacing);
   }
 }
