@@ -2,10 +2,12 @@
 // Copyright the Trigpoint developers
 #include "downsample.hpp"
 
+#include "plane_fit.hpp"
 #include "voxel_key.hpp"
+#include <Eigen/Eigenvalues>
 
-#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <utility>
 
 namespace trigpoint::lio_mapper {
@@ -61,31 +63,73 @@ class VoxelNumbering {
   std::uint32_t count_{0};
 };
 
+/// Fewer points tell nothing of how they scatter.
+constexpr int kFewestOfSurface = 6;
+/// One that scatters by less along an axis (standard deviation) does so by noise.
+constexpr double kThin_m = 0.03;
+
+struct Voxel {
+  Eigen::Vector3d centre_m;
+  Moments offsets;           ///< of its points from the centre, m
+  Eigen::Vector3f target_m;  ///< the point nearest to it is kept
+  float least_distance2_m2{std::numeric_limits<float>::max()};
+};
+
+/// The centre, but the mean of the points along the axes along which they only scatter by noise.
+Eigen::Vector3f target_of(const Voxel& voxel) {
+  Eigen::Vector3d target_m = voxel.centre_m;
+  if (voxel.offsets.count >= kFewestOfSurface) {
+    const Eigen::Vector3d mean_m = voxel.offsets.sum.matrix() / voxel.offsets.count;
+    const Eigen::Matrix3d covariance_m2 =
+        voxel.offsets.outer() / voxel.offsets.count - mean_m * mean_m.transpose();
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;
+    axes.computeDirect(covariance_m2);
+    for (int i = 0; i < 3 && axes.eigenvalues()[i] < kThin_m * kThin_m; ++i) {
+      const auto axis = axes.eigenvectors().col(i);
+      target_m += axis.dot(mean_m) * axis;
+    }
+  }
+  return target_m.cast<float>();
+}
+
 template <typename Point>
-std::vector<Point> keep_centre_most(const std::vector<Point>& points, double voxel_m) {
+std::vector<Point> keep_one_a_voxel(const std::vector<Point>& points, double voxel_m) {
   if (!(voxel_m > 0.0)) {
     return points;
   }
+  constexpr std::uint32_t kNone = 0xFFFFFFFF;
   const double inverse_voxel_per_m = 1.0 / voxel_m;
-  VoxelNumbering voxels;
-  std::vector<Point> kept;
-  std::vector<float> distances2;  // of `kept` from their centres, in voxels
-  for (const Point& point : points) {
-    if (!voxel_index_fits(point.x, point.y, point.z, inverse_voxel_per_m)) {
+  VoxelNumbering numbering;
+  std::vector<Voxel> voxels;
+  std::vector<std::uint32_t> numbers(points.size(), kNone);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3d p(points[i].x, points[i].y, points[i].z);
+    if (!voxel_index_fits(p.x(), p.y(), p.z(), inverse_voxel_per_m)) {
       continue;
     }
-    const VoxelIndex index = voxel_index(point.x, point.y, point.z, inverse_voxel_per_m);
-    const double dx = point.x * inverse_voxel_per_m - (index.x + 0.5);
-    const double dy = point.y * inverse_voxel_per_m - (index.y + 0.5);
-    const double dz = point.z * inverse_voxel_per_m - (index.z + 0.5);
-    const auto distance2 = static_cast<float>(dx * dx + dy * dy + dz * dz);
-    const std::uint32_t number = voxels.number_of(voxel_key(index));
-    if (number == kept.size()) {
-      kept.push_back(point);
-      distances2.push_back(distance2);
-    } else if (distance2 < distances2[number]) {
-      kept[number] = point;
-      distances2[number] = distance2;
+    const VoxelIndex index = voxel_index(p.x(), p.y(), p.z(), inverse_voxel_per_m);
+    numbers[i] = numbering.number_of(voxel_key(index));
+    if (numbers[i] == voxels.size()) {
+      voxels.emplace_back().centre_m =
+          voxel_m * Eigen::Vector3d(index.x + 0.5, index.y + 0.5, index.z + 0.5);
+    }
+    Voxel& voxel = voxels[numbers[i]];
+    voxel.offsets.add(p - voxel.centre_m);
+  }
+  for (Voxel& voxel : voxels) {
+    voxel.target_m = target_of(voxel);
+  }
+  std::vector<Point> kept(voxels.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (numbers[i] == kNone) {
+      continue;
+    }
+    Voxel& voxel = voxels[numbers[i]];
+    const Eigen::Vector3f p(points[i].x, points[i].y, points[i].z);
+    const float distance2_m2 = (p - voxel.target_m).squaredNorm();
+    if (distance2_m2 < voxel.least_distance2_m2) {
+      voxel.least_distance2_m2 = distance2_m2;
+      kept[numbers[i]] = points[i];
     }
   }
   return kept;
@@ -94,11 +138,11 @@ std::vector<Point> keep_centre_most(const std::vector<Point>& points, double vox
 }  // namespace
 
 PointCloud downsample(const PointCloud& points, double voxel_m) {
-  return keep_centre_most(points, voxel_m);
+  return keep_one_a_voxel(points, voxel_m);
 }
 
 std::vector<TimedPoint> downsample(const std::vector<TimedPoint>& points, double voxel_m) {
-  return keep_centre_most(points, voxel_m);
+  return keep_one_a_voxel(points, voxel_m);
 }
 
 }  // namespace trigpoint::lio_mapper
