@@ -19,6 +19,8 @@ constexpr double kReadmission_m = 10.0;  // step after an outage that is remembe
 constexpr double kLostSpeed_mps = 2.0;   // doubts after the position had to be set
 constexpr double kLostYaw_rad = 0.5;
 constexpr double kStillAbsorbed = 3.0;  // sigmas of the class
+constexpr double kStuckLimits = 5.0;    // times absorb_limit_s, before a stuck receiver is believed
+constexpr double kFaster = 1.5;         // than fixes confirmed: a strapdown that is wrong
 constexpr double kSteady_s = 10.0;      // a receiver that jumps again sooner does not hold still
 
 }  // namespace
@@ -70,6 +72,17 @@ bool InsTracker::has_come_back(InsTrack& track, const MapFix& fix, Part part) co
   return true;
 }
 
+/// Stuck is who stands where the strapdown, by its own sigma, cannot. A robot at rest whose
+/// accelerometer is wrong does not shake, or is soon faster than moving fixes ever confirmed.
+void InsTracker::note_stuck(InsTrack& track, const MapFix& fix, Part part) const {
+  Contradiction& contradiction = track.parts[part];
+  contradiction.runs_away =
+      contradiction.runs_away || speed_mps(track) > kFaster * track.confirmed_speed_mps;
+  if (track.quiet_ns < contradiction.steady_ns && !contradiction.runs_away) {
+    contradiction.stuck_ns = fix.checked.stamp_ns;
+  }
+}
+
 /// Of a receiver that jumped again and again: true when its fixes went where the strapdown went for
 /// long enough without a silence. Then the filter was right, or they hold still at another place.
 bool InsTracker::is_steady_again(InsTrack& track, const MapFix& fix, Part part) const {
@@ -82,6 +95,12 @@ bool InsTracker::is_steady_again(InsTrack& track, const MapFix& fix, Part part) 
   const Matrix3d way_m2 =
       passed_s * passed_s * track.filter.P.block<3, 3>(ins::kVelocity, ins::kVelocity);
   const Vector3d unlike_m = off_m - contradiction.steady_off_m;
+  const Vector3d moved_m = fix.antenna_map_m - contradiction.steady_fix_map_m;
+  const bool stands = squared_sigmas(moved_m, fixes_m2, part) <= gate_[part];
+  if (contradiction.steady_ns != 0 && stands &&
+      squared_sigmas(moved_m - unlike_m, fixes_m2 + way_m2, part) > gate_[part]) {
+    note_stuck(track, fix, part);
+  }
   const bool was_away = silence_s(track, fix) > config_.eskf18.suspect_outage_s;
   if (contradiction.steady_ns == 0 || was_away ||
       squared_sigmas(unlike_m, fixes_m2 + way_m2, part) > gate_[part]) {
@@ -92,8 +111,6 @@ bool InsTracker::is_steady_again(InsTrack& track, const MapFix& fix, Part part) 
   }
   // A strapdown that has become uncertain may allow for it, but fixes that stand still while it
   // moves are stuck and not steady.
-  const Vector3d moved_m = fix.antenna_map_m - contradiction.steady_fix_map_m;
-  const bool stands = squared_sigmas(moved_m, fixes_m2, part) <= gate_[part];
   if (stands && squared_sigmas(moved_m - unlike_m, fixes_m2, part) > gate_[part]) {
     return false;
   }
@@ -152,7 +169,8 @@ bool InsTracker::resolve(InsTrack& track,
     if (contradiction.absorbed_ns > 0 &&
         to_seconds(contradiction.streak.first_ns - contradiction.jumped_ns) < kSteady_s) {
       contradiction.unsteady = true;
-      contradiction.steady_ns = 0;
+      contradiction.steady_ns = contradiction.stuck_ns = 0;
+      contradiction.runs_away = false;
       contradiction.streak = RefusedStreak{};
       return false;
     }
@@ -230,6 +248,14 @@ void InsTracker::recover(InsTrack& track, const MapFix& fix, Part part) const {
   ++track.recoveries;
 }
 
+/// Whether fixes that the filter has gone without for so long are believed.
+bool InsTracker::is_over(const Contradiction& contradiction, const MapFix& fix) const {
+  const double since_s = to_seconds(fix.checked.stamp_ns - contradiction.absorbed_ns);
+  const bool stuck = contradiction.unsteady &&
+                     to_seconds(fix.checked.stamp_ns - contradiction.stuck_ns) < kSteady_s;
+  return since_s > (stuck ? kStuckLimits : 1.0) * config_.eskf18.absorb_limit_s;
+}
+
 void InsTracker::end_absorptions(InsTrack& track, const MapFix& fix) const {
   const Eskf18Config& c = config_.eskf18;
   for (const Part part : kParts) {
@@ -243,7 +269,7 @@ void InsTracker::end_absorptions(InsTrack& track, const MapFix& fix) const {
         std::sqrt(c.fix_slow_share * fix.covariance_map_m2.diagonal().segment(first, count).sum());
     if (error_m < kStillAbsorbed * sigma_m && !track.parts[part].unsteady) {
       track.parts[part].absorbed_ns = 0;
-    } else if (to_seconds(fix.checked.stamp_ns - since_ns) > c.absorb_limit_s) {
+    } else if (is_over(track.parts[part], fix)) {
       recover(track, fix, part);
     } else {
       track.doubt_until_ns = std::max(track.doubt_until_ns, fix.checked.stamp_ns);

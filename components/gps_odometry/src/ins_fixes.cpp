@@ -355,6 +355,9 @@ void InsTracker::accept(InsTrack& track, const MapFix& fix) const {
     track.accepted_antenna_map_m = antenna(track.filter, lever_base_m_);
     track.accepted_covariance_map_m2 = H * track.filter.P * H.transpose();
     track.accepted_covariance_map_m2.diagonal() += added_variance_m2(track);
+    if (track.parts[kHorizontal].absorbed_ns == 0 && fix.checked.stamp_ns < track.moves_until_ns) {
+      track.confirmed_speed_mps = std::max(track.confirmed_speed_mps, speed_mps(track));
+    }
   } else {
     track.accepted_antenna_map_m = fix.antenna_map_m;
     track.accepted_covariance_map_m2 = fix.covariance_map_m2;

@@ -73,7 +73,7 @@ void InsTracker::start(InsTrack& track, const CheckedImu& imu) const {
   track.heading.restart();
   track.aiding = AidingState{};
   // The IMU's clock may have moved: what was stamped before says nothing any more.
-  track.no_side_slip_ns = track.doubt_until_ns = track.saturated_ns = 0;
+  track.no_side_slip_ns = track.doubt_until_ns = track.saturated_ns = track.quiet_ns = 0;
   track.heard_ns = track.accepted_ns;
   track.parts = {};
   track.lately = {};
@@ -168,6 +168,7 @@ void InsTracker::apply(InsTrack& track, const CheckedImu& imu) const {
   track.stamp_ns = std::max(track.stamp_ns, imu.stamp_ns);
   track.imu_ns = imu.stamp_ns;
   track.imu = {imu.raw_gyro_radps, imu.accel_mps2};
+  track.quiet_ns = imu.quiet ? imu.stamp_ns : track.quiet_ns;
   track.saturated_ns = saturated ? imu.stamp_ns : track.saturated_ns;
   if (gap_s > kLongGap_s && gap_s <= kRestartGap_s) {
     for_each(track, [&](Eskf18& filter) {

@@ -41,7 +41,9 @@ struct Contradiction {
   /// It jumps again and again (stuck, dragged along, wandering): fixes are not used, until they go
   /// where the strapdown goes.
   bool unsteady{false};
-  Nanoseconds steady_ns{0};                                   ///< since when they do; 0: not yet
+  Nanoseconds stuck_ns{0};   ///< newest fix of those that stand where the strapdown cannot; 0: none
+  bool runs_away{false};     ///< the strapdown, meanwhile
+  Nanoseconds steady_ns{0};  ///< since when they do; 0: not yet
   Eigen::Vector3d steady_fix_map_m{Eigen::Vector3d::Zero()};  ///< the fix then
   Eigen::Vector3d steady_off_m{Eigen::Vector3d::Zero()};      ///< that fix less the antenna
 };
@@ -64,9 +66,11 @@ struct FixOnTheWay {
 
 struct InsTrack : Track {
   Eskf18 filter;
-  ImuMean imu;                     ///< the newest sample
-  Nanoseconds saturated_ns{0};     ///< of the newest IMU sample that was; 0: none
-  Nanoseconds no_side_slip_ns{0};  ///< of the newest such measurement
+  ImuMean imu;                      ///< the newest sample
+  Nanoseconds saturated_ns{0};      ///< of the newest IMU sample that was; 0: none
+  Nanoseconds quiet_ns{0};          ///< end of the newest window in which the IMU did not shake
+  double confirmed_speed_mps{0.0};  ///< the highest at which fixes that moved agreed
+  Nanoseconds no_side_slip_ns{0};   ///< of the newest such measurement
   HeadingSearch heading;
 
   /// The same with the heading turned round, until the data decide (a start in reverse).
@@ -165,7 +169,9 @@ class InsTracker {
   void absorb(InsTrack& track, const MapFix& fix, Part part, const Judgement& judgement) const;
   bool has_come_back(InsTrack& track, const MapFix& fix, Part part) const;
   bool is_steady_again(InsTrack& track, const MapFix& fix, Part part) const;
+  void note_stuck(InsTrack& track, const MapFix& fix, Part part) const;
   void recover(InsTrack& track, const MapFix& fix, Part part) const;
+  bool is_over(const Contradiction& contradiction, const MapFix& fix) const;
   void end_absorptions(InsTrack& track, const MapFix& fix) const;
   void clip(Judgement& judgement, Part part) const;
   static void ignore(Judgement& judgement, Part part);

@@ -36,6 +36,8 @@ struct LyingDriveSettings {
   std::function<bool(double)> is_blind;         ///< LIO along odom's x; may be empty: never
   double claimed_sigma_m{0.01};                 ///< horizontally; twice that in height
   std::function<double(double)> claimed_share;  ///< of it, at a time; may be empty: 1
+  /// By the filter, instead of twice what the receiver claims; may be empty.
+  std::function<double(double)> filter_sigma_m;
   double lio_walk_m_per_sqrt_m{0.007};
   double lio_scale{0.0005};                             ///< LIO's way is longer by this share
   Eigen::Vector3d lio_jump_m{Eigen::Vector3d::Zero()};  ///< of odom against map during an outage
@@ -212,6 +214,12 @@ class LyingDrive {
     return {sigma_m, sigma_m, 2.0 * sigma_m};
   }
 
+  Eigen::Matrix3d filter_m2() const {
+    const Eigen::Vector3d twice_m = 2.0 * claimed_m();
+    const double share = s_.filter_sigma_m ? s_.filter_sigma_m(now_s_) / twice_m.x() : 1.0;
+    return (share * twice_m).cwiseAbs2().asDiagonal();
+  }
+
   bool fixes_now() const { return !s_.has_fix || s_.has_fix(now_s_); }
 
   void no_fix() {
@@ -244,11 +252,7 @@ class LyingDrive {
     raw.covariance_type = CovarianceType::kDiagonalKnown;
     raw.covariance_enu_m2 = claimed_m().cwiseAbs2().asDiagonal();
     const bool refused = s_.is_refused && s_.is_refused(now_s_);
-    const FixRecord record{raw.stamp_ns,
-                           !refused,
-                           refused ? "gate" : "",
-                           antenna_m,
-                           (2.0 * claimed_m()).cwiseAbs2().asDiagonal()};
+    const FixRecord record{raw.stamp_ns, !refused, refused ? "gate" : "", antenna_m, filter_m2()};
     const double delay_s = s_.delay_s ? s_.delay_s(fixes_.size()) : 0.0;
     fixes_.push_back(std::llround(now_s_ / kTick_s));
     waiting_.emplace(now_s_ + s_.fix_latency_s + delay_s, Waiting{raw, record});
@@ -305,7 +309,7 @@ class LyingDrive {
     odometry.child_frame_id = "base_link";
     odometry.T_frame_child = T_map_base();
     odometry.linear_mps = {s_.speed_mps, 0.0, 0.0};
-    odometry.pose_covariance.topLeftCorner<3, 3>() = (2.0 * claimed_m()).cwiseAbs2().asDiagonal();
+    odometry.pose_covariance.topLeftCorner<3, 3>() = filter_m2();
     keep(gate_.on_gps_odometry(odometry, "gps"));
   }
 

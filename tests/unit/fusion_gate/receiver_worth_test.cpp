@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <functional>
 #include <random>
 
@@ -132,6 +133,44 @@ TEST(ReceiverWorth, follows_a_receiver_that_has_become_better) {
     EXPECT_GT(drive.share_used(0, 95.0, 120.0), 0.95);
     EXPECT_EQ(drive.share_used(0, 120.5, 130.0), 0.0);
     EXPECT_LT(drive.worst(0, 1, 70.0, 120.0), 0.2);
+  }
+}
+
+TEST(ReceiverWorth, is_what_it_says_where_the_alignment_found_no_more) {
+  ReceiverWorth worth{Config{}};
+  worth.on_alignment(kSaid_m2, 0.5 * kSaid_m2);
+  EXPECT_EQ(worth.least_m2(kSaid_m2), 0.0);
+}
+
+/// Positions by code that claim 0.15 m and scatter by a metre, of which the filter knows; from 60 s
+/// on RTK. Once nothing was measured of a receiver whose filter had found it out: its fixes were
+/// held against its claim, and doubted.
+LyingDriveSettings code_before_rtk(std::uint64_t seed) {
+  LyingDriveSettings settings = smoothly(seed);
+  settings.config.threshold = {2.0, 2.0, 4.0};
+  settings.claimed_sigma_m = 0.15;
+  settings.claimed_share = [](double at_s) { return at_s < 60.0 ? 1.0 : 0.1; };
+  settings.filter_sigma_m = [](double at_s) { return at_s < 60.0 ? 1.2 : 0.03; };
+  settings.lie_enu_m = [random = std::mt19937_64(seed)](double at_s) mutable {
+    std::normal_distribution<double> normal(0.0, at_s < 60.0 ? 1.0 : 0.01);
+    return Eigen::Vector3d(normal(random), normal(random), 0.0);
+  };
+  return settings;
+}
+
+TEST(ReceiverWorth, is_measured_although_the_filter_knows_of_it) {
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    LyingDrive drive(code_before_rtk(seed));
+    drive.run();
+    std::printf("seed %d: used %.2f, of RTK %.2f; %.2f m off before it, %.2f m after 30 s of it\n",
+                static_cast<int>(seed),
+                drive.share_used(0, 35.0, 60.0),
+                drive.share_used(0, 70.0, 149.0),
+                drive.worst(0, 1, 55.0, 60.0),
+                drive.worst(0, 1, 90.0));
+    EXPECT_GT(drive.share_used(0, 35.0, 60.0), 0.8);
+    EXPECT_GT(drive.share_used(0, 70.0, 149.0), 0.9);
+    EXPECT_LT(drive.worst(0, 1, 90.0), 0.2);
   }
 }
 

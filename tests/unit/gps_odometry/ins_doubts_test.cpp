@@ -265,5 +265,68 @@ TEST(InsDoubts, know_a_slow_receiver_that_jumps_again_and_again) {
   EXPECT_FALSE(was_accepted(result, 120.0)) << "it jumped again";
 }
 
+/// For two and a half minutes. Once such fixes were believed after one.
+TEST(InsDoubts, last_as_long_as_the_strapdown_excludes_fixes_that_stand) {
+  for (const double speed_mps : {1.5, 4.0}) {
+    const auto truth = drive(town(speed_mps, 3.0), 240.0);
+    std::mt19937 random(1);
+    std::normal_distribution<double> noise_m(0.0, 0.003);
+    GnssFix stuck;
+    const auto inputs =
+        with_fixes(sense(truth, cheap_robot(1), 1), [&](double time_s, GnssFix& fix) {
+          if (time_s > 60.0 && time_s < 210.0) {
+            stuck = stuck.stamp_ns == 0 ? fix : stuck;
+            fix.latitude_deg = stuck.latitude_deg + noise_m(random) / kDegree_m;
+            fix.longitude_deg = stuck.longitude_deg + noise_m(random) / kDegree_m;
+          }
+          return true;
+        });
+    GpsOdometry filter(config_with_datum("eskf18"), cheap_robot(1).robot);
+    const Recorded result = run(filter, inputs, truth);
+    const Horizontal lying = horizontal(result, 60.0, 210.0);
+    std::printf("stuck for 150 s at %.1f m/s: %.2f m off, %.1f sigma\n",
+                speed_mps,
+                lying.error_m,
+                lying.sigmas);
+    EXPECT_LT(lying.error_m, 5.0);
+    EXPECT_LT(lying.sigmas, 3.0);
+    EXPECT_LT(horizontal(result, 220.0, 240.0).error_m, 0.2);
+  }
+}
+
+/// The robot stands, and so do its fixes; an accelerometer that is wrong of a sudden drives off.
+TEST(InsDoubts, end_after_a_minute_where_it_is_the_filter_that_is_wrong) {
+  for (const double shake_mps2 : {0.0, 0.3}) {
+    Profile profile = steadily(1.5);
+    const auto driving_mps = profile.speed_mps;
+    profile.speed_mps = [=](double t) {
+      return driving_mps(t) * std::clamp((55.0 - t) / 3.0, 0.0, 1.0);
+    };
+    const auto truth = drive(profile, 130.0);
+    auto inputs = sense(truth, cheap_robot(2), 2);
+    std::mt19937 random(2);
+    std::normal_distribution<double> shake(0.0, 1.0);
+    for (Input& input : inputs) {
+      const double time_s = to_seconds(input.imu.stamp_ns - kEpoch_ns);
+      if (!input.is_fix && time_s > 55.0) {
+        input.imu.accel_mps2 +=
+            shake_mps2 * Eigen::Vector3d(shake(random), shake(random), shake(random));
+        input.imu.accel_mps2.x() += time_s > 60.0 ? 2.0 : 0.0;
+      }
+    }
+    GpsOdometry filter(config_with_datum("eskf18"), cheap_robot(2).robot);
+    const Recorded result = run(filter, inputs, truth);
+    const double off_m = horizontal(result, 118.0, 119.0).error_m;
+    const double later_m = horizontal(result, 124.0, 125.0).error_m;
+    std::printf(
+        "wrong by 2 m/s^2, shaking by %.1f m/s^2: %.1f m off after 59 s, %.1f m after 65 s\n",
+        shake_mps2,
+        off_m,
+        later_m);
+    EXPECT_GT(off_m, 50.0) << "the filter is wrong";
+    EXPECT_LT(later_m, 5.0);
+  }
+}
+
 }  // namespace
 }  // namespace trigpoint::gps_odometry

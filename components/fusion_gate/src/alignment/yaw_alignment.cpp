@@ -270,24 +270,38 @@ double variance_factor(double chi_square, double degrees_of_freedom, double leas
   return factor > 1.0 ? factor : std::clamp(at_most, least, 1.0);
 }
 
+/// What the median of squares of two axes tells of a variance of one, after fitting so many pairs.
+double variance_of(const std::vector<double>& squares) {
+  constexpr double kMedian = 1.386;   // of chi-square with 2 degrees of freedom
+  constexpr double kSolvedFor = 1.5;  // of pairs: yaw, x and y of two axes each
+  const auto n = static_cast<double>(squares.size());
+  return median(squares) / kMedian * n / (n - kSolvedFor);
+}
+
+struct Received {
+  double factor{1.0};       // by what the pairs' variances are too small for it
+  double variance_m2{0.0};  // of one axis
+};
+
 /// The same of the receiver's own fixes, by the median of their residuals: coarse ones, on a grid
 /// of a metre say, are as coarse as they lie about the way, however small and smooth they are in
 /// what the filter makes of them.
-double received_factor(const std::vector<AlignmentPair>& pairs, const ScaledPose& estimate) {
-  constexpr double kMedian = 1.386;   // of chi-square with 2 degrees of freedom
-  constexpr double kSolvedFor = 1.5;  // of pairs: yaw, x and y of two axes each
-  const auto n = static_cast<double>(pairs.size());
-  if (n <= kSolvedFor || std::all_of(pairs.begin(), pairs.end(), [](const AlignmentPair& pair) {
-        return pair.received_off_m.isZero();
-      })) {
-    return 1.0;
+Received received_of(const std::vector<AlignmentPair>& pairs, const ScaledPose& estimate) {
+  constexpr std::size_t kLeast = 2;
+  if (pairs.size() < kLeast) {
+    return {};
   }
+  std::vector<double> squares_m2;
   std::vector<double> squared_sigmas;
   for (const AlignmentPair& pair : pairs) {
     const Eigen::Vector2d off_m = residual_of(pair, estimate).head<2>() + pair.received_off_m;
+    squares_m2.push_back(off_m.squaredNorm());
     squared_sigmas.push_back(off_m.cwiseAbs2().cwiseQuotient(pair.variance_map_m2.head<2>()).sum());
   }
-  return median(squared_sigmas) / kMedian * n / (n - kSolvedFor);
+  const bool are_pairs = std::all_of(pairs.begin(), pairs.end(), [](const AlignmentPair& pair) {
+    return pair.received_off_m.isZero();
+  });
+  return {are_pairs ? 1.0 : variance_of(squared_sigmas), variance_of(squares_m2)};
 }
 
 double least_share_of(const std::vector<AlignmentPair>& pairs) {
@@ -354,11 +368,11 @@ std::optional<AlignmentSolution> solve_alignment(const std::vector<AlignmentPair
   solution.chi_square_limit =
       config.residual_tolerance * chi_square_quantile(dof, kStandardNormal999);
   solution.outlier_share = outlier_share_of(weights);
-  const double of_receiver = received_factor(pairs, estimate);
+  const Received received = received_of(pairs, estimate);
   double factor = variance_factor(solution.chi_square, dof, least_share_of(pairs));
-  if (of_receiver > 1.0) {
-    factor = std::max(factor, of_receiver);
-    solution.received_m2 = of_receiver * pairs.back().variance_map_m2.head<2>().maxCoeff();
+  solution.received_m2 = received.variance_m2;
+  if (received.factor > 1.0) {
+    factor = std::max(factor, received.factor);
   }
   const Matrix5d information = system.information / factor + by_heading;  // not of its own
   const Matrix5d covariance = information.ldlt().solve(Matrix5d::Identity());

@@ -50,8 +50,8 @@ struct AlignmentSolution {
   double chi_square_limit{0.0};
   double outlier_share{0.0};
   std::size_t pairs{0};
-  /// Of the receiver's own fixes, along east and north, where they lie about the solution by more
-  /// than the pairs' variance says; else 0.
+  /// Of the receiver's own fixes (where they are not known, of the pairs) about the solution, along
+  /// east or north.
   double received_m2{0.0};
   bool contradicts_heading{false};  ///< which was left out therefore
 

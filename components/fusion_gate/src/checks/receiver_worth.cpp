@@ -21,7 +21,7 @@ constexpr double kMedian = 1.386;      // of chi-square with 2 degrees of freedo
 void ReceiverWorth::on_alignment(double said_m2, double measured_m2) {
   kinds_.clear();
   way_.clear();
-  if (measured_m2 > 0.0) {
+  if (measured_m2 > said_m2) {
     kinds_.push_back({said_m2, measured_m2});
   }
 }

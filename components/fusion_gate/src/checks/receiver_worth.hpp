@@ -19,8 +19,7 @@ class ReceiverWorth {
  public:
   explicit ReceiverWorth(const Config& config) : config_(config) {}
 
-  /// The receiver said `said_m2`; its fixes lay about the first alignment by `measured_m2`, or,
-  /// where that is 0, by no more than was said.
+  /// The receiver said `said_m2`; its fixes lay about the first alignment by `measured_m2`.
   void on_alignment(double said_m2, double measured_m2);
 
   /// What a fix that says `said_m2` does not count as less than; 0: as it says.
