@@ -101,8 +101,8 @@ void describe_matching(MatchingConfig& c, ConfigFields& f) {
   f.number(
       "patch_m",
       c.patch_m,
-      "the residuals of a scan in a cube of this side share the map's errors, which count as "
-      "often as there are residuals in it",
+      "the residuals of a scan in a cube of this side together weigh as one, because they share "
+      "the map's errors",
       {0.01, 1000.0});
   f.integer("max_patches",
             c.max_patches,

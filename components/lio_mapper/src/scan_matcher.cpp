@@ -88,14 +88,12 @@ typename Information<Size>::Matrix noise_free_share(const Information<Size>& sum
 /// is A^-1 B A^-1 [H. White, "A heteroskedasticity-consistent covariance matrix estimator", 1980],
 /// and the eigenvalues of L^-1 B L^-T are how many times the stated variance that is, direction by
 /// direction. Each such direction keeps its estimate and loses that share of its information, or
-/// gains it where they scatter less, down to the share `shared` of the stated variance. That share
-/// is the map's: the `per_patch` residuals of one patch have it in common, and it counts as often.
+/// gains it where they scatter less, down to the share `least` of the stated variance.
 template <int Size>
 void allow_for_scatter(const typename Information<Size>::Matrix& scatter,
                        const Eigen::LLT<typename Information<Size>::Matrix>& root,
                        const typename Information<Size>::Vector& step,
-                       double shared,
-                       double per_patch,
+                       double least,
                        Information<Size>& sum) {
   using Matrix = typename Information<Size>::Matrix;
   // What no residual sees scatters as the root says, neither more nor less.
@@ -103,10 +101,8 @@ void allow_for_scatter(const typename Information<Size>::Matrix& scatter,
   const Matrix times_stated = root.matrixL().solve(half.transpose());
   const Eigen::SelfAdjointEigenSolver<Matrix> eigen(times_stated);
   const Matrix directions = root.matrixL() * eigen.eigenvectors();
-  const auto times_of_patches =
-      (eigen.eigenvalues().array().max(shared) + (per_patch - 1.0) * shared).matrix();
-  sum.information =
-      directions * times_of_patches.cwiseInverse().asDiagonal() * directions.transpose();
+  sum.information = directions * eigen.eigenvalues().cwiseMax(least).cwiseInverse().asDiagonal() *
+                    directions.transpose();
   sum.gradient = -(sum.information * step).eval();
 }
 
@@ -297,7 +293,7 @@ Information<Size> ScanMatcher::sum_of_all(const Viewpoint& view,
 /// What the sum over all residuals is worth.
 template <int Size>
 Information<Size> ScanMatcher::weighed(Information<Size> sum,
-                                       double shared,
+                                       double least_scatter,
                                        Scratch<Size>& scratch) {
   if (sum.count == 0) {
     return sum;
@@ -308,14 +304,14 @@ Information<Size> ScanMatcher::weighed(Information<Size> sum,
   root_trust.template topLeftCorner<3, 3>() = open_.root_trust;
   const Eigen::LLT<Matrix> root(sum.information + kUnseen * Matrix::Identity());
   const typename Information<Size>::Vector step = -root.solve(sum.gradient);
+  allow_for_scatter(scatter_after(step, scratch), root, step, least_scatter, sum);
   const auto most = static_cast<std::size_t>(config_.max_patches);
-  const double per_patch =
-      static_cast<double>(sum.count) / static_cast<double>(std::min(count_patches(), most));
-  allow_for_scatter(scatter_after(step, scratch), root, step, shared, per_patch, sum);
+  const double scale =
+      static_cast<double>(std::min(count_patches(), most)) / static_cast<double>(sum.count);
   const Matrix both = root_trust * by;
-  sum.information = (both * sum.information * both.transpose()).eval();
-  sum.gradient = (root_trust * both * sum.gradient).eval();
-  sum.noise /= per_patch;
+  sum.information = (scale * both * sum.information * both.transpose()).eval();
+  sum.gradient = (scale * root_trust * both * sum.gradient).eval();
+  sum.noise *= scale;
   return sum;
 }
 

@@ -137,7 +137,7 @@ class ScanMatcher {
                                const MapOrigins* origins,
                                Scratch<Size>& scratch);
   template <int Size>
-  Information<Size> weighed(Information<Size> sum, double shared, Scratch<Size>& scratch);
+  Information<Size> weighed(Information<Size> sum, double least_scatter, Scratch<Size>& scratch);
   template <int Size>
   Information<Size> linearise_all(const Viewpoint& view,
                                   const MapOrigins* origins,

@@ -346,57 +346,6 @@ TEST(ScanMatcher, residuals_of_one_patch_weigh_as_one) {
   EXPECT_NEAR(information_of(900, 900) / information_of(900, 0), 2.0, 0.05);
 }
 
-/// Pieces of a room's walls, each within a patch of `config.patch_m`, off by an error of the map that its points
-/// share, and each point by its own noise.
-PointCloud noisy_walls(const MatchingConfig& config,
-                       double map_sigma_m,
-                       int per_patch,
-                       std::mt19937& random) {
-  std::normal_distribution<double> unit;
-  PointCloud points;
-  for (int patch = 0; patch < 192; ++patch) {
-    const int wall = patch / 64;
-    const double off_m = map_sigma_m * unit(random);
-    for (int i = 0; i < per_patch; ++i) {
-      Eigen::Vector3d p(10.0, 8.0, -2.0);
-      p[wall] += off_m + config.range_sigma_m * unit(random);
-      p[(wall + 1) % 3] += 3.0 * config.patch_m * (patch % 8 - 9) + 0.005 * i;
-      p[(wall + 2) % 3] += 3.0 * config.patch_m * (patch / 8 % 8 - 9);
-      points.push_back({static_cast<float>(p.x()),
-                        static_cast<float>(p.y()),
-                        static_cast<float>(p.z()),
-                        0.0F});
-    }
-  }
-  return points;
-}
-
-/// What the points of a patch have in common is the map's error; their own noise averages out. Over
-/// many maps and scans the pose is as far off as the information says.
-TEST(ScanMatcher, information_of_patches_is_that_of_shared_errors_and_of_noise_of_each_point) {
-  const RoomMap map;
-  MatchingConfig config;
-  config.patch_m = 0.6;
-  config.grazing_cos = 0.0;
-  PlaneMatch plane;
-  ASSERT_TRUE(map.match({10.0, 0.0, 0.0}, plane));
-  // The map's share of a point's variance: a centimetre, and how thick the plane is.
-  const double map_sigma_m = std::sqrt(1e-4 + plane.thickness2_m2);
-  std::mt19937 random(11);
-  for (const int per_patch : {1, 5, 40}) {
-    double nees = 0.0;
-    constexpr int kRuns = 200;
-    for (int run = 0; run < kRuns; ++run) {
-      const PointCloud points = noisy_walls(config, map_sigma_m, per_patch, random);
-      ScanMatcher matcher(points, map, Pose{}, config, one_worker);
-      const PoseInformation info = matcher.linearise({});
-      const Vector6d off = info.information.ldlt().solve(info.gradient);
-      nees += off.dot(info.information * off) / 6.0 / kRuns;
-    }
-    EXPECT_NEAR(nees, 1.0, 0.25) << per_patch << " points a patch";
-  }
-}
-
 TEST(ScanMatcher, more_patches_than_the_most_weigh_as_the_most) {
   const RoomMap map;
   const auto information_of = [&](std::int64_t max_patches) {

@@ -71,7 +71,7 @@ struct MatchingConfig {
   double angle_sigma_rad{1.5e-3};  ///< beam direction and divergence: counts at grazing incidence
   double robust_width{2.0};        ///< residuals beyond this many sigmas lose weight (Huber)
   double grazing_cos{0.15};        ///< planes that the beam hits more flatly lose weight
-  double patch_m{5.0};             ///< residuals in a cube of this side share the map's errors
+  double patch_m{5.0};             ///< residuals in a cube of this side weigh as one
   std::int64_t max_patches{200};   ///< more cubes weigh as this many
   std::int64_t min_matches{50};
   std::int64_t max_iterations{5};
