@@ -66,7 +66,8 @@ void describe(Config& config, ConfigFields& fields) {
                  {0, 10'000'000'000});
   fields.number("heartbeat_s",
                 config.heartbeat_s,
-                "how often a reliable writer asks its readers what they miss",
+                "how often a reliable writer asks its readers what they miss; of paced clouds "
+                "(Fast DDS) five times as often",
                 {0.005, 3.0});
   fields.number("lease_s",
                 config.lease_s,

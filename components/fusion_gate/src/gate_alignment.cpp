@@ -138,6 +138,7 @@ void FusionGate::Impl::add_pair(const AcceptedFix& fix,
   const Eigen::Vector3d antenna_odom_m = at_fix.T_frame_child * robot.antenna_position_base_m;
   const Eigen::Vector3d variance_m2 = floored(fix.covariance_map_m2, config.min_sigma_m).diagonal();
   const Witness witness = witness_of(fix, at_fix);
+  const AcceptedFix* said = raw_of(fix.stamp_ns);
   const Eigen::Vector2d received_off_m =
       (witness.as_received().antenna_map_m - fix.antenna_map_m).head<2>();
   heading.match(lio_poses);
@@ -151,7 +152,8 @@ void FusionGate::Impl::add_pair(const AcceptedFix& fix,
                                  at_fix.distance_m,
                                  least_share_of(witness).mean(),
                                  {},
-                                 received_off_m});
+                                 received_off_m,
+                                 level_m2(said == nullptr ? fix : *said)});
   tell_of_heading(measured, out);
   if (!window.admitted()) {
     const std::string why = window.obstacle().value_or("no solution");
@@ -167,9 +169,7 @@ void FusionGate::Impl::add_pair(const AcceptedFix& fix,
       lio ? lio->odom_epoch : 0, window.solution()->T_map_odom, window.solution()->covariance};
   out.state_updates.push_back(rows.make_alignment(fix, alignment));
   alignment_sent_ns = now_ns;
-  const AcceptedFix* said = raw_of(fix.stamp_ns);
-  const double measured_m2 = window.solution()->received_m2;
-  receiver.on_alignment(said == nullptr ? measured_m2 : level_m2(*said), measured_m2);
+  receiver.on_alignment(window.solution()->said_m2, window.solution()->received_m2);
   monitor.on_alignment(witness);
   verdicts.record(fix.stamp_ns, true, "alignment", "carries the first alignment");
   if (!was_admitted) {

@@ -274,6 +274,7 @@ AxisChoice FusionGate::Impl::choose_trusted(int axis, double variance_m2) const 
 /// taken for what it is worth.
 bool FusionGate::Impl::carries_though_doubted(int axis) const {
   return part_of(axis) == Part::kLevel && monitor.is_blind(*lio, axis) &&
+         std::isfinite(monitor.doubted_variance_m2()) &&
          monitor.doubted_variance_m2() <= monitor.blind_variance_map_m2(*lio)[axis];
 }
 

@@ -285,7 +285,8 @@ void describe_ins_fix(Eskf18Config& c, ConfigFields& f) {
             {2, 100});
   f.number("absorb_limit_s",
            c.absorb_limit_s,
-           "A jump that lasts longer is believed: the position is set to the fixes (s)",
+           "A jump that lasts longer is believed: the position is set to the fixes (s). Five times "
+           "as long where they stand",
            kPositive);
   f.number("suspect_outage_s",
            c.suspect_outage_s,

@@ -154,9 +154,9 @@ bool InsTracker::resolve(InsTrack& track,
   }
   extend(contradiction.streak, fix, config_.highest_speed_mps);
   if (contradiction.streak.count == 1) {
-    contradiction.filter_is_suspect = silence_s(track, fix) > config_.eskf18.suspect_outage_s ||
-                                      fix.checked.stamp_ns < track.doubt_until_ns ||
-                                      has_guessed(track, fix.checked.stamp_ns);
+    contradiction.filter_is_suspect =
+        track.heard_ns == 0 || silence_s(track, fix) > config_.eskf18.suspect_outage_s ||
+        fix.checked.stamp_ns < track.doubt_until_ns || has_guessed(track, fix.checked.stamp_ns);
   }
   if (contradiction.filter_is_suspect) {
     if (is_believed(contradiction.streak, config_.recovery_s)) {
@@ -249,10 +249,13 @@ void InsTracker::recover(InsTrack& track, const MapFix& fix, Part part) const {
 }
 
 /// Whether fixes that the filter has gone without for so long are believed.
-bool InsTracker::is_over(const Contradiction& contradiction, const MapFix& fix) const {
+bool InsTracker::is_over(const InsTrack& track, const MapFix& fix, Part part) const {
+  const Contradiction& contradiction = track.parts[part];
   const double since_s = to_seconds(fix.checked.stamp_ns - contradiction.absorbed_ns);
-  const bool stuck = contradiction.unsteady &&
-                     to_seconds(fix.checked.stamp_ns - contradiction.stuck_ns) < kSteady_s;
+  // For how long it stood no more, silences aside: away it has proven nothing.
+  const double moved_s =
+      to_seconds(fix.checked.stamp_ns - contradiction.stuck_ns) - silence_s(track, fix);
+  const bool stuck = contradiction.unsteady && contradiction.stuck_ns > 0 && moved_s < kSteady_s;
   return since_s > (stuck ? kStuckLimits : 1.0) * config_.eskf18.absorb_limit_s;
 }
 
@@ -269,7 +272,7 @@ void InsTracker::end_absorptions(InsTrack& track, const MapFix& fix) const {
         std::sqrt(c.fix_slow_share * fix.covariance_map_m2.diagonal().segment(first, count).sum());
     if (error_m < kStillAbsorbed * sigma_m && !track.parts[part].unsteady) {
       track.parts[part].absorbed_ns = 0;
-    } else if (is_over(track.parts[part], fix)) {
+    } else if (is_over(track, fix, part)) {
       recover(track, fix, part);
     } else {
       track.doubt_until_ns = std::max(track.doubt_until_ns, fix.checked.stamp_ns);

@@ -171,7 +171,7 @@ class InsTracker {
   bool is_steady_again(InsTrack& track, const MapFix& fix, Part part) const;
   void note_stuck(InsTrack& track, const MapFix& fix, Part part) const;
   void recover(InsTrack& track, const MapFix& fix, Part part) const;
-  bool is_over(const Contradiction& contradiction, const MapFix& fix) const;
+  bool is_over(const InsTrack& track, const MapFix& fix, Part part) const;
   void end_absorptions(InsTrack& track, const MapFix& fix) const;
   void clip(Judgement& judgement, Part part) const;
   static void ignore(Judgement& judgement, Part part);

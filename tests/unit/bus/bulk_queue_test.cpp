@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 
 namespace trigpoint::bus::fastdds {
@@ -96,6 +97,25 @@ struct Bulk : testing::Test {
   // Two datagrams a period, which is long enough to look at what happens in it.
   BulkQueue queue{Pacing{2 * kDatagram_bytes, 200ms}};
 };
+
+/// Else what is asked for in vain piles up, and what could still be repaired waits behind it.
+TEST_F(Bulk, does_not_repair_what_the_writer_no_longer_keeps) {
+  write(1, 2);
+  ASSERT_TRUE(socket.has_sent(2));
+  for (std::uint8_t fragment = 10; fragment < 15; ++fragment) {
+    queue.send(socket, piece(kClouds, 1, fragment), to);
+  }
+  queue.send(socket, piece(kClouds, 2, 10), to);
+  for (std::uint8_t number = 2; number < 2 + kDepth; ++number) {
+    write(number, 1);
+  }
+  ASSERT_TRUE(socket.has_sent(3 + kDepth));  // repairs go first
+  const auto sent = socket.sent();
+  EXPECT_EQ(std::count(sent.begin(), sent.end(), piece(kClouds, 2, 10)), 1);
+  for (std::uint8_t fragment = 10; fragment < 15; ++fragment) {
+    EXPECT_EQ(std::count(sent.begin(), sent.end(), piece(kClouds, 1, fragment)), 0);
+  }
+}
 
 TEST_F(Bulk, sends_new_clouds_in_portions_and_everything_else_at_once) {
   write(1, 5);

@@ -130,12 +130,27 @@ void BulkQueue::add_new(Datagram&& datagram, Writer& writer) {
     new_.back().destinations.push_back(std::move(datagram.destinations.front()));
     return;
   }
-  ++writer.waiting[datagram.sample.number];
+  if (++writer.waiting[datagram.sample.number] == 1) {
+    drop_old_repairs(datagram.sample, writer.depth);
+  }
   if (writer.waiting.size() > writer.depth) {
     drop_new(datagram.sample.writer, writer.waiting.begin()->first);
     writer.waiting.erase(writer.waiting.begin());
   }
   new_.push_back(std::move(datagram));
+}
+
+/// Of samples that the writer no longer keeps.
+void BulkQueue::drop_old_repairs(const CarriedSample& newest, std::size_t depth) {
+  const auto is_old = [&](const Datagram& each) {
+    return each.sample.writer == newest.writer && each.sample.number + depth <= newest.number;
+  };
+  for (const Datagram& each : repairs_) {
+    if (is_old(each)) {
+      repaired_.erase(each.hash());
+    }
+  }
+  std::erase_if(repairs_, is_old);
 }
 
 void BulkQueue::drop_new(EntityNumber writer, std::uint64_t number) {

@@ -21,8 +21,8 @@
 namespace trigpoint::bus::fastdds {
 
 /// Everything that a participant sends passes here, so that heartbeats tell the truth; only samples
-/// of bulk writers wait. An eighth of a portion is for repairs before anything else, so that new
-/// clouds do not stop when much is asked for.
+/// of bulk writers wait. Up to an eighth of a portion, but at least one datagram, is for repairs
+/// before anything else, so that new clouds do not stop when much is asked for.
 class BulkQueue {
  public:
   /// A period of which its thread is late, up to `catches_up`, is made up for at once: else a busy
@@ -72,6 +72,7 @@ class BulkQueue {
   };
 
   void add_new(Datagram&& datagram, Writer& writer);
+  void drop_old_repairs(const CarriedSample& newest, std::size_t depth);
   void drop_new(EntityNumber writer, std::uint64_t number);
   bool may_send_repair() const;
   void begin_period_if_due();

@@ -281,6 +281,7 @@ double variance_of(const std::vector<double>& squares) {
 struct Received {
   double factor{1.0};       // by what the pairs' variances are too small for it
   double variance_m2{0.0};  // of one axis
+  double said_m2{0.0};      // the same as it says
 };
 
 /// The same of the receiver's own fixes, by the median of their residuals: coarse ones, on a grid
@@ -293,7 +294,9 @@ Received received_of(const std::vector<AlignmentPair>& pairs, const ScaledPose& 
   }
   std::vector<double> squares_m2;
   std::vector<double> squared_sigmas;
+  std::vector<double> claims_m2;
   for (const AlignmentPair& pair : pairs) {
+    claims_m2.push_back(pair.said_m2);
     const Eigen::Vector2d off_m = residual_of(pair, estimate).head<2>() + pair.received_off_m;
     squares_m2.push_back(off_m.squaredNorm());
     squared_sigmas.push_back(off_m.cwiseAbs2().cwiseQuotient(pair.variance_map_m2.head<2>()).sum());
@@ -301,7 +304,8 @@ Received received_of(const std::vector<AlignmentPair>& pairs, const ScaledPose& 
   const bool are_pairs = std::all_of(pairs.begin(), pairs.end(), [](const AlignmentPair& pair) {
     return pair.received_off_m.isZero();
   });
-  return {are_pairs ? 1.0 : variance_of(squared_sigmas), variance_of(squares_m2)};
+  return {
+      are_pairs ? 1.0 : variance_of(squared_sigmas), variance_of(squares_m2), median(claims_m2)};
 }
 
 double least_share_of(const std::vector<AlignmentPair>& pairs) {
@@ -371,6 +375,7 @@ std::optional<AlignmentSolution> solve_alignment(const std::vector<AlignmentPair
   const Received received = received_of(pairs, estimate);
   double factor = variance_factor(solution.chi_square, dof, least_share_of(pairs));
   solution.received_m2 = received.variance_m2;
+  solution.said_m2 = received.said_m2;
   if (received.factor > 1.0) {
     factor = std::max(factor, received.factor);
   }

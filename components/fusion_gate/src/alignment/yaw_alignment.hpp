@@ -37,6 +37,7 @@ struct AlignmentPair {
   Slide slide{};  ///< since then
   /// What the receiver itself said less p_map_m, east and north: a filter smooths what it scatters.
   Eigen::Vector2d received_off_m{Eigen::Vector2d::Zero()};
+  double said_m2{0.0};  ///< the variance that it claimed for it, along east or north
 };
 
 struct AlignmentSolution {
@@ -53,6 +54,7 @@ struct AlignmentSolution {
   /// Of the receiver's own fixes (where they are not known, of the pairs) about the solution, along
   /// east or north.
   double received_m2{0.0};
+  double said_m2{0.0};  ///< median of what it claimed for them
   bool contradicts_heading{false};  ///< which was left out therefore
 
   double yaw_sigma_rad() const;
