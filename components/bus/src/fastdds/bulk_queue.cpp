@@ -86,17 +86,22 @@ void BulkQueue::add_writer(EntityNumber writer, std::size_t depth) {
   }
 }
 
+template <typename Which>
+void BulkQueue::drop_repairs(const Which& which) {
+  for (const Datagram& each : repairs_) {
+    if (which(each)) {
+      repaired_.erase(each.hash());
+    }
+  }
+  std::erase_if(repairs_, which);
+}
+
 void BulkQueue::remove_writer(EntityNumber writer) {
   const std::lock_guard lock(mutex_);
   const auto is_its = [writer](const Datagram& each) { return each.sample.writer == writer; };
   writers_.erase(writer);
   std::erase_if(new_, is_its);
-  for (const Datagram& each : repairs_) {
-    if (is_its(each)) {
-      repaired_.erase(each.hash());
-    }
-  }
-  std::erase_if(repairs_, is_its);
+  drop_repairs(is_its);
 }
 
 bool BulkQueue::send(SenderResource& socket,
@@ -131,26 +136,16 @@ void BulkQueue::add_new(Datagram&& datagram, Writer& writer) {
     return;
   }
   if (++writer.waiting[datagram.sample.number] == 1) {
-    drop_old_repairs(datagram.sample, writer.depth);
+    // Of samples that the writer no longer keeps.
+    drop_repairs([newest = datagram.sample, depth = writer.depth](const Datagram& each) {
+      return each.sample.writer == newest.writer && each.sample.number + depth <= newest.number;
+    });
   }
   if (writer.waiting.size() > writer.depth) {
     drop_new(datagram.sample.writer, writer.waiting.begin()->first);
     writer.waiting.erase(writer.waiting.begin());
   }
   new_.push_back(std::move(datagram));
-}
-
-/// Of samples that the writer no longer keeps.
-void BulkQueue::drop_old_repairs(const CarriedSample& newest, std::size_t depth) {
-  const auto is_old = [&](const Datagram& each) {
-    return each.sample.writer == newest.writer && each.sample.number + depth <= newest.number;
-  };
-  for (const Datagram& each : repairs_) {
-    if (is_old(each)) {
-      repaired_.erase(each.hash());
-    }
-  }
-  std::erase_if(repairs_, is_old);
 }
 
 void BulkQueue::drop_new(EntityNumber writer, std::uint64_t number) {

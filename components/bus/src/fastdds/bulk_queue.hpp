@@ -72,7 +72,8 @@ class BulkQueue {
   };
 
   void add_new(Datagram&& datagram, Writer& writer);
-  void drop_old_repairs(const CarriedSample& newest, std::size_t depth);
+  template <typename Which>
+  void drop_repairs(const Which& which);
   void drop_new(EntityNumber writer, std::uint64_t number);
   bool may_send_repair() const;
   void begin_period_if_due();

@@ -14,4 +14,13 @@ inline double median(std::vector<double> values) {
   return *middle;
 }
 
+/// What the median of the squared lengths of residuals in two axes tells of the variance of one
+/// axis, after so many parameters were solved for, per axis. There must be more residuals than
+/// that.
+inline double variance_of_squares(const std::vector<double>& squares, double solved_for) {
+  constexpr double kMedian = 1.386;  // of chi-square with 2 degrees of freedom
+  const auto n = static_cast<double>(squares.size());
+  return median(squares) / kMedian * n / (n - solved_for);
+}
+
 }  // namespace trigpoint::fusion_gate

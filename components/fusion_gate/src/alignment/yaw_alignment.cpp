@@ -270,14 +270,6 @@ double variance_factor(double chi_square, double degrees_of_freedom, double leas
   return factor > 1.0 ? factor : std::clamp(at_most, least, 1.0);
 }
 
-/// What the median of squares of two axes tells of a variance of one, after fitting so many pairs.
-double variance_of(const std::vector<double>& squares) {
-  constexpr double kMedian = 1.386;   // of chi-square with 2 degrees of freedom
-  constexpr double kSolvedFor = 1.5;  // of pairs: yaw, x and y of two axes each
-  const auto n = static_cast<double>(squares.size());
-  return median(squares) / kMedian * n / (n - kSolvedFor);
-}
-
 struct Received {
   double factor{1.0};       // by what the pairs' variances are too small for it
   double variance_m2{0.0};  // of one axis
@@ -304,8 +296,10 @@ Received received_of(const std::vector<AlignmentPair>& pairs, const ScaledPose& 
   const bool are_pairs = std::all_of(pairs.begin(), pairs.end(), [](const AlignmentPair& pair) {
     return pair.received_off_m.isZero();
   });
-  return {
-      are_pairs ? 1.0 : variance_of(squared_sigmas), variance_of(squares_m2), median(claims_m2)};
+  constexpr double kSolvedFor = 1.5;  // of pairs: yaw, x and y of two axes each
+  return {are_pairs ? 1.0 : variance_of_squares(squared_sigmas, kSolvedFor),
+          variance_of_squares(squares_m2, kSolvedFor),
+          median(claims_m2)};
 }
 
 double least_share_of(const std::vector<AlignmentPair>& pairs) {

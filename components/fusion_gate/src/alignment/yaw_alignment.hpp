@@ -54,7 +54,7 @@ struct AlignmentSolution {
   /// Of the receiver's own fixes (where they are not known, of the pairs) about the solution, along
   /// east or north.
   double received_m2{0.0};
-  double said_m2{0.0};  ///< median of what it claimed for them
+  double said_m2{0.0};              ///< median of what it claimed for them
   bool contradicts_heading{false};  ///< which was left out therefore
 
   double yaw_sigma_rad() const;

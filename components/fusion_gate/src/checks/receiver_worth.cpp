@@ -14,7 +14,6 @@ namespace {
 
 constexpr double kWellBelow = 4.0;     // a ratio of variances: another kind of solution
 constexpr std::size_t kOnTheWay = 10;  // fixes over the baseline
-constexpr double kMedian = 1.386;      // of chi-square with 2 degrees of freedom
 
 }  // namespace
 
@@ -84,8 +83,8 @@ double ReceiverWorth::measured_on_the_way_m2(double yaw_rad) const {
     const Eigen::Vector2d off_m = seen.gps_map_m - R_map_odom * seen.lio_odom_m;
     squares_m2.push_back((off_m - middle_m).squaredNorm());
   }
-  const auto n = static_cast<double>(way_.size());
-  return median(squares_m2) / kMedian * n / (n - 1.0);
+  constexpr double kSolvedFor = 1.0;  // x and y
+  return variance_of_squares(squares_m2, kSolvedFor);
 }
 
 }  // namespace trigpoint::fusion_gate
