@@ -27,12 +27,27 @@ constexpr double kSeen_m = 0.5;        // a point this far from its plane counts
 constexpr double kGroundRadius_m = 12.0;
 constexpr double kStandsOut_m = 0.5;  // above the ground
 constexpr std::size_t kCoarsePoints = 150;
+constexpr std::size_t kClimbPoints = 500;
 constexpr std::size_t kFinePoints = 1500;
 constexpr std::size_t kFewestPoints = 80;
 constexpr std::size_t kRefined = 16;
+/// The best places of the grid climb so often at half the steps, within a step of the grid: between
+/// poles and trees the matcher finds its way over some centimetres only.
+constexpr int kHalvings = 3;
+constexpr int kMostClimbs = 4;  // at steps of one size
+/// Around the best place found every place is looked at: in foliage the matcher stops a metre away,
+/// where the next trees stand.
+constexpr double kAround_m = 1.5;
+constexpr double kAroundYaw_rad = 0.04;
+constexpr double kAroundStep_m = 0.25;
+constexpr double kAroundYawStep_rad = 0.01;
+constexpr double kAroundSeen_m = 0.3;
+constexpr std::size_t kRefinedAround = 6;
 /// Two places or headings that differ by less are the same one.
 constexpr double kSame_m = 1.0;
 constexpr double kSame_rad = 0.05;
+constexpr double kSameAround_m = 0.4;
+constexpr double kSameAround_rad = 0.03;
 constexpr double kFoundOnPlane_m = 0.1;
 constexpr std::int64_t kMaxIterations = 20;
 constexpr int kRounds = 6;
@@ -42,6 +57,10 @@ constexpr double kPriorLevel_rad = 0.01;
 constexpr double kPriorYaw_rad = 0.2;
 /// More, and the residuals have not the size that the matcher gives them.
 constexpr double kMostChi2 = 4.0;
+/// What is likely has so large a share of what is asked for acceptance, and so many times the share
+/// of any other place.
+constexpr double kLikely = 0.5;
+constexpr double kLikelyLead = 1.6;
 
 struct Hypothesis {
   Vector3d p_odom_m;
@@ -50,8 +69,20 @@ struct Hypothesis {
   double score{0.0};
 };
 
-bool are_same(const Vector3d& a, double yaw_a, const Vector3d& b, double yaw_b) {
-  return (a - b).head<2>().norm() < kSame_m && std::abs(wrap_angle(yaw_a - yaw_b)) < kSame_rad;
+struct Apart {
+  double distance_m;
+  double yaw_rad;
+};
+
+constexpr Apart kOtherPlace{kSame_m, kSame_rad};
+
+bool are_same(const Vector3d& a,
+              double yaw_a,
+              const Vector3d& b,
+              double yaw_b,
+              const Apart& apart) {
+  return (a - b).head<2>().norm() < apart.distance_m &&
+         std::abs(wrap_angle(yaw_a - yaw_b)) < apart.yaw_rad;
 }
 
 /// Every n-th, so that at most `most` are left.
@@ -66,9 +97,10 @@ std::vector<Vector3d> thinned(const std::vector<Vector3d>& points, std::size_t m
 
 /// The scan in level axes about base, apart into what stands out and the ground.
 struct Parts {
-  double ground_m{0.0};                ///< height of the ground below base, negative
-  std::vector<Vector3d> near_level_m;  ///< stand out, for the grid
-  std::vector<Vector3d> tall_level_m;  ///< stand out, all
+  double ground_m{0.0};                 ///< height of the ground below base, negative
+  std::vector<Vector3d> near_level_m;   ///< stand out, for the grid
+  std::vector<Vector3d> climb_level_m;  ///< the same, more of them
+  std::vector<Vector3d> tall_level_m;   ///< stand out, all
 };
 
 Parts parts_of(const LevelScan& scan) {
@@ -92,6 +124,7 @@ Parts parts_of(const LevelScan& scan) {
   if (parts.near_level_m.size() < kFewestPoints) {
     parts.near_level_m = parts.tall_level_m;
   }
+  parts.climb_level_m = thinned(parts.near_level_m, kClimbPoints);
   parts.near_level_m = thinned(parts.near_level_m, kCoarsePoints);
   parts.tall_level_m = thinned(parts.tall_level_m, kFinePoints);
   return parts;
@@ -136,7 +169,10 @@ void add_grid(const SearchArea& area,
   }
 }
 
-double score_of(const Hypothesis& h, const std::vector<Vector3d>& level, const LocalMap& map) {
+double score_of(const Hypothesis& h,
+                const std::vector<Vector3d>& level,
+                const LocalMap& map,
+                double seen_m) {
   const double c = std::cos(h.yaw_rad);
   const double s = std::sin(h.yaw_rad);
   double sum = 0.0;
@@ -146,28 +182,96 @@ double score_of(const Hypothesis& h, const std::vector<Vector3d>& level, const L
                                 s * p.x() + c * p.y() + h.p_odom_m.y(),
                                 p.z() + h.p_odom_m.z()};
     if (map.match_surface(point_odom_m, plane)) {
-      const double ratio = (plane.normal.dot(point_odom_m) + plane.offset_m) / kSeen_m;
+      const double ratio = (plane.normal.dot(point_odom_m) + plane.offset_m) / seen_m;
       sum += std::max(0.0, 1.0 - ratio * ratio);
     }
   }
   return sum / static_cast<double>(level.size());
 }
 
+void score(std::vector<Hypothesis>& all,
+           const std::vector<Vector3d>& level,
+           const LocalMap& map,
+           double seen_m,
+           Workers& workers) {
+  constexpr std::size_t kBlock = 64;
+  workers.run((all.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
+    for (std::size_t i = block * kBlock; i < std::min(all.size(), (block + 1) * kBlock); ++i) {
+      all[i].score = score_of(all[i], level, map, seen_m);
+    }
+  });
+}
+
 /// The best ones, none of them the same place as a better one.
-std::vector<Hypothesis> best_of(std::vector<Hypothesis> all) {
+std::vector<Hypothesis> best_of(std::vector<Hypothesis> all, std::size_t most, const Apart& apart) {
   std::stable_sort(all.begin(), all.end(), [](const Hypothesis& a, const Hypothesis& b) {
     return a.score > b.score;
   });
   std::vector<Hypothesis> best;
   for (const Hypothesis& h : all) {
     const bool is_new = std::none_of(best.begin(), best.end(), [&](const Hypothesis& better) {
-      return are_same(h.p_odom_m, h.yaw_rad, better.p_odom_m, better.yaw_rad);
+      return are_same(h.p_odom_m, h.yaw_rad, better.p_odom_m, better.yaw_rad, apart);
     });
     if (is_new) {
       best.push_back(h);
     }
-    if (best.size() == kRefined) {
+    if (best.size() == most) {
       break;
+    }
+  }
+  return best;
+}
+
+/// All places around one, in its height.
+std::vector<Hypothesis> around(const Pose& T, std::size_t centre) {
+  const int steps = static_cast<int>(std::lround(kAround_m / kAroundStep_m));
+  const int turns = static_cast<int>(std::lround(kAroundYaw_rad / kAroundYawStep_rad));
+  std::vector<Hypothesis> all;
+  for (int x = -steps; x <= steps; ++x) {
+    for (int y = -steps; y <= steps; ++y) {
+      for (int turn = -turns; turn <= turns; ++turn) {
+        all.push_back({T.p + kAroundStep_m * Vector3d(x, y, 0.0),
+                       wrap_angle(yaw_of(T.q) + kAroundYawStep_rad * turn),
+                       centre,
+                       0.0});
+      }
+    }
+  }
+  return all;
+}
+
+/// The best place within a step of a hypothesis of the grid.
+Hypothesis climbed(const Hypothesis& start,
+                   const std::vector<Vector3d>& level,
+                   const LocalMap& map) {
+  const auto moved = [&](const Eigen::Vector3d& steps) {
+    Hypothesis h = start;
+    h.p_odom_m.head<2>() += kStep_m * steps.head<2>();
+    h.yaw_rad = wrap_angle(h.yaw_rad + kYawStep_rad * steps.z());
+    h.score = score_of(h, level, map, kSeen_m);
+    return h;
+  };
+  Vector3d at = Vector3d::Zero();  // in steps of the grid
+  Hypothesis best = moved(at);
+  double step = 1.0;
+  for (int halving = 0; halving < kHalvings; ++halving) {
+    step *= 0.5;
+    for (int climb = 0; climb < kMostClimbs; ++climb) {
+      const Vector3d from = at;
+      for (int i = 0; i < 6; ++i) {
+        const Vector3d to = from + (i % 2 == 0 ? step : -step) * Vector3d::Unit(i / 2);
+        if (to.cwiseAbs().maxCoeff() > 1.0) {
+          continue;
+        }
+        const Hypothesis next = moved(to);
+        if (next.score > best.score) {
+          best = next;
+          at = to;
+        }
+      }
+      if (at == from) {
+        break;
+      }
     }
   }
   return best;
@@ -249,8 +353,34 @@ void judge(const Parts& parts,
   registration.chi2 = chi2 / static_cast<double>(std::max<std::size_t>(1, near));
 }
 
+/// Of several places the one on which most of the scan lies, and how well the next one does.
+Registration best_found(const std::vector<Registration>& found) {
+  Registration best = *std::max_element(
+      found.begin(), found.end(), [](const auto& a, const auto& b) { return a.share < b.share; });
+  for (const Registration& other : found) {
+    if (!are_same(other.T_odom_base.p,
+                  yaw_of(other.T_odom_base.q),
+                  best.T_odom_base.p,
+                  yaw_of(best.T_odom_base.q),
+                  kOtherPlace)) {
+      best.runner_up_share = std::max(best.runner_up_share, other.share);
+    }
+  }
+  return best;
+}
+
+double away_m(const Registration& best) {
+  return (best.T_odom_base.p - best.nearest_centre.p).head<2>().norm();
+}
+
+bool is_likely(const Registration& best, double farthest_m, const RecoveryConfig& config) {
+  return best.share >= kLikely * config.min_share && best.fit >= kLikely * config.min_fit &&
+         best.share >= kLikelyLead * best.runner_up_share && away_m(best) <= farthest_m &&
+         best.chi2 <= kMostChi2;
+}
+
 /// Empty when nothing speaks against it.
-std::string obstacle_to(const Registration& best, const RecoveryConfig& config) {
+std::string obstacle_to(const Registration& best, double farthest_m, const RecoveryConfig& config) {
   const bool covered = best.share >= config.min_share;
   const bool fits = best.fit >= config.min_fit;
   const bool leads = best.share - best.runner_up_share >= config.min_lead;
@@ -266,6 +396,15 @@ std::string obstacle_to(const Registration& best, const RecoveryConfig& config) 
                   100.0 * config.min_fit,
                   100.0 * best.runner_up_share,
                   100.0 * config.min_lead);
+    return text;
+  }
+  if (away_m(best) > farthest_m) {
+    char text[120];
+    std::snprintf(text,
+                  sizeof text,
+                  "the best place is %.1f m from the expected one (at most %.1f)",
+                  away_m(best),
+                  farthest_m);
     return text;
   }
   if (best.chi2 > kMostChi2) {
@@ -295,39 +434,39 @@ RegistrationResult register_scan(const LevelScan& scan,
   for (std::size_t i = 0; i < area.centres_odom.size(); ++i) {
     add_grid(area, i, map, parts.ground_m, all);
   }
-  constexpr std::size_t kBlock = 64;
-  workers.run((all.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
-    for (std::size_t i = block * kBlock; i < std::min(all.size(), (block + 1) * kBlock); ++i) {
-      all[i].score = score_of(all[i], parts.near_level_m, map);
-    }
-  });
+  score(all, parts.near_level_m, map, kSeen_m, workers);
   std::vector<Registration> found;
-  for (const Hypothesis& h : best_of(std::move(all))) {
-    const auto T = refined(h, scan, scan.points_base, map, matching, workers);
-    if (T) {
-      Registration& registration = found.emplace_back();
-      registration.T_odom_base = *T;
-      registration.nearest_centre = area.centres_odom[h.centre];
-      judge(parts, scan, map, matching, registration);
+  const auto refine = [&](const std::vector<Hypothesis>& hypotheses) {
+    for (const Hypothesis& h : hypotheses) {
+      const auto T = refined(h, scan, scan.points_base, map, matching, workers);
+      if (T) {
+        Registration& registration = found.emplace_back();
+        registration.T_odom_base = *T;
+        registration.centre = h.centre;
+        registration.nearest_centre = area.centres_odom[h.centre];
+        judge(parts, scan, map, matching, registration);
+      }
     }
-  }
+  };
+  std::vector<Hypothesis> best = best_of(std::move(all), kRefined, kOtherPlace);
+  workers.run(best.size(),
+              [&](std::size_t i) { best[i] = climbed(best[i], parts.climb_level_m, map); });
+  refine(best);
   if (found.empty()) {
     result.obstacle = "the scan matches nowhere";
     return result;
   }
-  const auto best = std::max_element(
-      found.begin(), found.end(), [](const auto& a, const auto& b) { return a.share < b.share; });
-  for (const Registration& other : found) {
-    if (!are_same(other.T_odom_base.p,
-                  yaw_of(other.T_odom_base.q),
-                  best->T_odom_base.p,
-                  yaw_of(best->T_odom_base.q))) {
-      best->runner_up_share = std::max(best->runner_up_share, other.share);
-    }
+  result.best = best_found(found);
+  result.obstacle = obstacle_to(*result.best, area.farthest_m, config);
+  if (!result.obstacle.empty()) {
+    std::vector<Hypothesis> near = around(result.best->T_odom_base, result.best->centre);
+    score(near, parts.climb_level_m, map, kAroundSeen_m, workers);
+    refine(best_of(std::move(near), kRefinedAround, {kSameAround_m, kSameAround_rad}));
+    result.best = best_found(found);
+    result.obstacle = obstacle_to(*result.best, area.farthest_m, config);
   }
-  result.best = *best;
-  result.obstacle = obstacle_to(*best, config);
   result.accepted = result.obstacle.empty();
+  result.likely = is_likely(*result.best, area.farthest_m, config);
   return result;
 }
 

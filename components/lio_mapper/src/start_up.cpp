@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace trigpoint::lio_mapper {
 
@@ -30,7 +31,12 @@ constexpr double kVelocityMoving_mps = 0.5;
 constexpr double kUnseenSpeed = 0.5;
 /// Of the first velocity where no scan tells it: most robots start at rest or at a walking pace.
 constexpr double kVelocityUnseen_mps = 2.0;
-constexpr int kRefinements = 2;
+/// A trial corrects about half of what its speed is wrong by, because it undistorts the first sweep
+/// with it.
+constexpr int kMostRefinements = 6;
+constexpr double kSettled_mps = 0.1;
+/// Trials that began with different speeds and end so near to each other found the same one.
+constexpr double kAgreeing_mps = 0.5;
 constexpr int kTrials = 3;
 
 Eigen::Quaterniond without_yaw(const Eigen::Quaterniond& q) {
@@ -79,9 +85,11 @@ struct FirstVelocity {
   bool is_seen;  ///< by the sweeps, along base x
 };
 
-/// Zero unless a forward speed explains the second sweep clearly better. On a plain all speeds fit
-/// alike, and by which of them more points find a plane is chance: a speed counts only where the
-/// sweep determines it.
+/// Zero unless a forward speed explains the second sweep clearly better, or several speeds lead to
+/// one and the sweep does not lock to standing still. A speed counts only where the sweep
+/// determines it: on a plain all fit alike, and by which of them more points find a plane is
+/// chance. A robot that stands sees also that; beside long walls, on which most of a scan fits at
+/// any speed, the rings on the ground make standing still fit better than driving does.
 FirstVelocity find_velocity(const Config& config,
                             const Pose& T_base_lidar,
                             const ImuBuffer& imu,
@@ -92,24 +100,40 @@ FirstVelocity find_velocity(const Config& config,
     return try_start(
         config, T_base_lidar, imu, sweeps, with_velocity(initial, v_base_mps, step_mps));
   };
-  const Trial standing = attempt(Vector3d::Zero());
   const auto sees_speed = [step_mps](const Trial& trial) {
     return trial.forward_sigma_mps < kUnseenSpeed * step_mps;
   };
-  Trial best = standing;
+  const auto refined = [&](Trial trial) {
+    for (int i = 0; i < kMostRefinements; ++i) {
+      const Vector3d tried_mps = trial.v_base_mps;
+      trial = attempt(tried_mps);
+      if ((trial.v_base_mps - tried_mps).norm() < kSettled_mps) {
+        break;
+      }
+    }
+    return trial;
+  };
+  const Trial standing = refined(attempt(Vector3d::Zero()));
+  std::vector<Trial> moving;
   for (double speed = -kBackwardSpeed_mps; speed <= config.start.max_speed_mps; speed += step_mps) {
-    const Trial trial = attempt(speed * Vector3d::UnitX());
-    if (trial.share > best.share && sees_speed(trial)) {
-      best = trial;
+    const Trial first = attempt(speed * Vector3d::UnitX());
+    if (sees_speed(first)) {
+      moving.push_back(refined(first));
     }
   }
-  if (best.share < standing.share + kClearlyBetter) {
-    best = standing;
+  std::erase_if(moving, [&](const Trial& trial) { return !sees_speed(trial); });
+  const auto best = std::max_element(
+      moving.begin(), moving.end(), [](const auto& a, const auto& b) { return a.share < b.share; });
+  if (best == moving.end()) {
+    return {standing.v_base_mps, sees_speed(standing)};
   }
-  for (int i = 0; i < kRefinements; ++i) {
-    best = attempt(best.v_base_mps);
-  }
-  return {best.v_base_mps, sees_speed(best)};
+  const auto agreeing = std::count_if(moving.begin(), moving.end(), [&](const Trial& trial) {
+    return (trial.v_base_mps - best->v_base_mps).norm() < kAgreeing_mps;
+  });
+  const bool locks_only_there = !sees_speed(standing) && agreeing > 1;
+  return locks_only_there || best->share > standing.share + kClearlyBetter
+             ? FirstVelocity{best->v_base_mps, true}
+             : FirstVelocity{standing.v_base_mps, sees_speed(standing)};
 }
 
 /// A start as a trial run over the waiting sweeps corrects it.
