@@ -57,9 +57,10 @@ struct RegistrationResult {
 
 /// A grid of places and headings, each put on the ground, is scored with some hundred points that
 /// stand out of the ground; the best few, apart from each other, climb within their cell of the
-/// grid and are refined with the iterated matcher against all points. Accepted only when most of
-/// the points that stand out lie on the map, clearly more than at any other place. Deterministic
-/// for any number of workers.
+/// grid and are refined with the iterated matcher against all points. Where none of them is
+/// accepted every place around the best is tried too. Accepted only when most of the points that
+/// stand out lie on the map, clearly more than at any other place. Deterministic for any number of
+/// workers.
 RegistrationResult register_scan(const LevelScan& scan,
                                  const LocalMap& map,
                                  const SearchArea& area,

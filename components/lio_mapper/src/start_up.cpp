@@ -23,6 +23,9 @@ constexpr double kRestForceChange_mps2 = 0.1;
 constexpr double kClearlyBetter = 0.03;
 constexpr double kBackwardSpeed_mps = 4.0;
 constexpr double kLongestStillStep_s = 0.02;
+/// Over the waiting sweeps, by a robot that seemed to stand.
+constexpr double kMoved_m = 0.1;
+constexpr double kMovedSigmas = 5.0;
 constexpr double kTiltMoving_rad = 0.1;
 /// The trial matches against a map that its own first motion built.
 constexpr double kTrialSigmaFactor = 2.0;
@@ -141,6 +144,7 @@ struct Relevelled {
   Vector3d gravity_base_mps2;  ///< axes of base at the start
   Vector3d v_base_mps;         ///< at the start
   double tilt_sigma_rad;
+  bool has_moved;
 };
 
 /// Gravity and first velocity after a trial run over all sweeps that the IMU covers. The velocity
@@ -165,9 +169,13 @@ Relevelled relevel(const Config& config,
   }
   const Eigen::Quaterniond q_base_odom = initial.state.T_odom_base.q.conjugate();
   const double variance = filter.covariance().diagonal().segment<2>(error::kGravity).maxCoeff();
+  const Vector3d moved_m = filter.state().T_odom_base.p - initial.state.T_odom_base.p;
+  const Matrix3d moved_m2 = filter.covariance().block<3, 3>(error::kPosition, error::kPosition);
+  const double moved_sigma_m = std::sqrt(moved_m.normalized().dot(moved_m2 * moved_m.normalized()));
   return {q_base_odom * filter.state().gravity_odom_mps2,
           q_base_odom * (filter.state().v_odom_mps - unaided.v_odom_mps),
-          kTrialSigmaFactor * std::sqrt(variance)};
+          kTrialSigmaFactor * std::sqrt(variance),
+          moved_m.norm() > std::max(kMoved_m, kMovedSigmas * moved_sigma_m)};
 }
 
 Nanoseconds start_stamp(const ImuBuffer& imu, const std::deque<Sweep>& sweeps) {
@@ -330,10 +338,18 @@ StartResult start(const Config& configured,
   const double v_sigma_mps = first.is_seen ? kVelocityMoving_mps : kVelocityUnseen_mps;
   // Two sweeps alone leave decimetres a second; all that wait leave centimetres.
   const bool is_quiet = looks_at_rest(summary);
-  const auto stands = [&] { return is_quiet && v_base.norm() < config.start.rest_speed_mps; };
-  for (int i = 0; i < kTrials && !stands(); ++i) {
-    const Relevelled found = relevel(
+  bool has_moved = false;
+  const auto stands = [&] {
+    return is_quiet && !has_moved && v_base.norm() < config.start.rest_speed_mps;
+  };
+  const auto relevelled = [&] {
+    return relevel(
         config, T_base_lidar, imu, sweeps, with_velocity(result.initial, v_base, v_sigma_mps));
+  };
+  // Who drives off evenly seems to lean.
+  has_moved = stands() && relevelled().has_moved;
+  for (int i = 0; i < kTrials && !stands(); ++i) {
+    const Relevelled found = relevelled();
     v_base = found.v_base_mps;
     // The prior of the next trial is as open as the first one's: the same data must not count
     // twice.

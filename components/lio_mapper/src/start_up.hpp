@@ -35,7 +35,8 @@ ImuSummary summarize(const ImuBuffer& imu, Nanoseconds from_ns, Nanoseconds to_n
 std::optional<Event> check_specific_force(const Eigen::Vector3d& mean_force_mps2,
                                           Nanoseconds stamp_ns);
 
-/// True when nothing in the IMU contradicts standing still. A steady ride looks the same.
+/// True when nothing in the IMU contradicts standing still. A steady ride looks the same, and so
+/// does driving off evenly on another slope.
 bool looks_at_rest(const ImuSummary& summary);
 
 /// Uncertainty of a levelled start besides the accelerometer's bias.
@@ -64,7 +65,8 @@ struct StartResult {
 bool can_start(const StartConfig& config, const ImuBuffer& imu, const std::deque<Sweep>& sweeps);
 
 /// Levels, finds the first velocity by trying forward speeds on the first two sweeps, and in motion
-/// levels again with the gravity that a trial run over the waiting sweeps found.
+/// levels again with the gravity that a trial run over the waiting sweeps found. At rest is only
+/// who does not move in such a trial either.
 StartResult start(const Config& configured,
                   const Pose& T_base_lidar,
                   const ImuBuffer& imu,
