@@ -35,19 +35,9 @@ constexpr std::size_t kRefined = 16;
 /// poles and trees the matcher finds its way over some centimetres only.
 constexpr int kHalvings = 3;
 constexpr int kMostClimbs = 4;  // at steps of one size
-/// Around the best place found every place is looked at: in foliage the matcher stops a metre away,
-/// where the next trees stand.
-constexpr double kAround_m = 1.5;
-constexpr double kAroundYaw_rad = 0.04;
-constexpr double kAroundStep_m = 0.25;
-constexpr double kAroundYawStep_rad = 0.01;
-constexpr double kAroundSeen_m = 0.3;
-constexpr std::size_t kRefinedAround = 6;
 /// Two places or headings that differ by less are the same one.
 constexpr double kSame_m = 1.0;
 constexpr double kSame_rad = 0.05;
-constexpr double kSameAround_m = 0.4;
-constexpr double kSameAround_rad = 0.03;
 constexpr double kFoundOnPlane_m = 0.1;
 constexpr std::int64_t kMaxIterations = 20;
 constexpr int kRounds = 6;
@@ -57,10 +47,6 @@ constexpr double kPriorLevel_rad = 0.01;
 constexpr double kPriorYaw_rad = 0.2;
 /// More, and the residuals have not the size that the matcher gives them.
 constexpr double kMostChi2 = 4.0;
-/// What is likely has so large a share of what is asked for acceptance, and so many times the share
-/// of any other place.
-constexpr double kLikely = 0.5;
-constexpr double kLikelyLead = 1.6;
 
 struct Hypothesis {
   Vector3d p_odom_m;
@@ -69,20 +55,8 @@ struct Hypothesis {
   double score{0.0};
 };
 
-struct Apart {
-  double distance_m;
-  double yaw_rad;
-};
-
-constexpr Apart kOtherPlace{kSame_m, kSame_rad};
-
-bool are_same(const Vector3d& a,
-              double yaw_a,
-              const Vector3d& b,
-              double yaw_b,
-              const Apart& apart) {
-  return (a - b).head<2>().norm() < apart.distance_m &&
-         std::abs(wrap_angle(yaw_a - yaw_b)) < apart.yaw_rad;
+bool are_same(const Vector3d& a, double yaw_a, const Vector3d& b, double yaw_b) {
+  return (a - b).head<2>().norm() < kSame_m && std::abs(wrap_angle(yaw_a - yaw_b)) < kSame_rad;
 }
 
 /// Every n-th, so that at most `most` are left.
@@ -98,6 +72,7 @@ std::vector<Vector3d> thinned(const std::vector<Vector3d>& points, std::size_t m
 /// The scan in level axes about base, apart into what stands out and the ground.
 struct Parts {
   double ground_m{0.0};                 ///< height of the ground below base, negative
+  std::size_t count{0};                 ///< stand out, near ones where there are enough of them
   std::vector<Vector3d> near_level_m;   ///< stand out, for the grid
   std::vector<Vector3d> climb_level_m;  ///< the same, more of them
   std::vector<Vector3d> tall_level_m;   ///< stand out, all
@@ -124,6 +99,7 @@ Parts parts_of(const LevelScan& scan) {
   if (parts.near_level_m.size() < kFewestPoints) {
     parts.near_level_m = parts.tall_level_m;
   }
+  parts.count = parts.near_level_m.size();
   parts.climb_level_m = thinned(parts.near_level_m, kClimbPoints);
   parts.near_level_m = thinned(parts.near_level_m, kCoarsePoints);
   parts.tall_level_m = thinned(parts.tall_level_m, kFinePoints);
@@ -169,10 +145,7 @@ void add_grid(const SearchArea& area,
   }
 }
 
-double score_of(const Hypothesis& h,
-                const std::vector<Vector3d>& level,
-                const LocalMap& map,
-                double seen_m) {
+double score_of(const Hypothesis& h, const std::vector<Vector3d>& level, const LocalMap& map) {
   const double c = std::cos(h.yaw_rad);
   const double s = std::sin(h.yaw_rad);
   double sum = 0.0;
@@ -182,62 +155,31 @@ double score_of(const Hypothesis& h,
                                 s * p.x() + c * p.y() + h.p_odom_m.y(),
                                 p.z() + h.p_odom_m.z()};
     if (map.match_surface(point_odom_m, plane)) {
-      const double ratio = (plane.normal.dot(point_odom_m) + plane.offset_m) / seen_m;
+      const double ratio = (plane.normal.dot(point_odom_m) + plane.offset_m) / kSeen_m;
       sum += std::max(0.0, 1.0 - ratio * ratio);
     }
   }
   return sum / static_cast<double>(level.size());
 }
 
-void score(std::vector<Hypothesis>& all,
-           const std::vector<Vector3d>& level,
-           const LocalMap& map,
-           double seen_m,
-           Workers& workers) {
-  constexpr std::size_t kBlock = 64;
-  workers.run((all.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
-    for (std::size_t i = block * kBlock; i < std::min(all.size(), (block + 1) * kBlock); ++i) {
-      all[i].score = score_of(all[i], level, map, seen_m);
-    }
-  });
-}
-
 /// The best ones, none of them the same place as a better one.
-std::vector<Hypothesis> best_of(std::vector<Hypothesis> all, std::size_t most, const Apart& apart) {
+std::vector<Hypothesis> best_of(std::vector<Hypothesis> all) {
   std::stable_sort(all.begin(), all.end(), [](const Hypothesis& a, const Hypothesis& b) {
     return a.score > b.score;
   });
   std::vector<Hypothesis> best;
   for (const Hypothesis& h : all) {
     const bool is_new = std::none_of(best.begin(), best.end(), [&](const Hypothesis& better) {
-      return are_same(h.p_odom_m, h.yaw_rad, better.p_odom_m, better.yaw_rad, apart);
+      return are_same(h.p_odom_m, h.yaw_rad, better.p_odom_m, better.yaw_rad);
     });
     if (is_new) {
       best.push_back(h);
     }
-    if (best.size() == most) {
+    if (best.size() == kRefined) {
       break;
     }
   }
   return best;
-}
-
-/// All places around one, in its height.
-std::vector<Hypothesis> around(const Pose& T, std::size_t centre) {
-  const int steps = static_cast<int>(std::lround(kAround_m / kAroundStep_m));
-  const int turns = static_cast<int>(std::lround(kAroundYaw_rad / kAroundYawStep_rad));
-  std::vector<Hypothesis> all;
-  for (int x = -steps; x <= steps; ++x) {
-    for (int y = -steps; y <= steps; ++y) {
-      for (int turn = -turns; turn <= turns; ++turn) {
-        all.push_back({T.p + kAroundStep_m * Vector3d(x, y, 0.0),
-                       wrap_angle(yaw_of(T.q) + kAroundYawStep_rad * turn),
-                       centre,
-                       0.0});
-      }
-    }
-  }
-  return all;
 }
 
 /// The best place within a step of a hypothesis of the grid.
@@ -248,7 +190,7 @@ Hypothesis climbed(const Hypothesis& start,
     Hypothesis h = start;
     h.p_odom_m.head<2>() += kStep_m * steps.head<2>();
     h.yaw_rad = wrap_angle(h.yaw_rad + kYawStep_rad * steps.z());
-    h.score = score_of(h, level, map, kSeen_m);
+    h.score = score_of(h, level, map);
     return h;
   };
   Vector3d at = Vector3d::Zero();  // in steps of the grid
@@ -361,8 +303,7 @@ Registration best_found(const std::vector<Registration>& found) {
     if (!are_same(other.T_odom_base.p,
                   yaw_of(other.T_odom_base.q),
                   best.T_odom_base.p,
-                  yaw_of(best.T_odom_base.q),
-                  kOtherPlace)) {
+                  yaw_of(best.T_odom_base.q))) {
       best.runner_up_share = std::max(best.runner_up_share, other.share);
     }
   }
@@ -370,13 +311,7 @@ Registration best_found(const std::vector<Registration>& found) {
 }
 
 double away_m(const Registration& best) {
-  return (best.T_odom_base.p - best.nearest_centre.p).head<2>().norm();
-}
-
-bool is_likely(const Registration& best, double farthest_m, const RecoveryConfig& config) {
-  return best.share >= kLikely * config.min_share && best.fit >= kLikely * config.min_fit &&
-         best.share >= kLikelyLead * best.runner_up_share && away_m(best) <= farthest_m &&
-         best.chi2 <= kMostChi2;
+  return (best.T_odom_base.p - best.centre.p).head<2>().norm();
 }
 
 /// Empty when nothing speaks against it.
@@ -423,9 +358,9 @@ RegistrationResult register_scan(const LevelScan& scan,
                                  Workers& workers) {
   RegistrationResult result;
   const Parts parts = parts_of(scan);
-  if (map.empty() || parts.near_level_m.size() < kFewestPoints) {
+  if (map.empty() || parts.count < kFewestPoints) {
     result.obstacle = map.empty() ? "the map is empty there"
-                                  : std::to_string(parts.near_level_m.size()) +
+                                  : std::to_string(parts.count) +
                                         " points stand out of the ground, at least " +
                                         std::to_string(kFewestPoints) + " needed";
     return result;
@@ -434,39 +369,32 @@ RegistrationResult register_scan(const LevelScan& scan,
   for (std::size_t i = 0; i < area.centres_odom.size(); ++i) {
     add_grid(area, i, map, parts.ground_m, all);
   }
-  score(all, parts.near_level_m, map, kSeen_m, workers);
-  std::vector<Registration> found;
-  const auto refine = [&](const std::vector<Hypothesis>& hypotheses) {
-    for (const Hypothesis& h : hypotheses) {
-      const auto T = refined(h, scan, scan.points_base, map, matching, workers);
-      if (T) {
-        Registration& registration = found.emplace_back();
-        registration.T_odom_base = *T;
-        registration.centre = h.centre;
-        registration.nearest_centre = area.centres_odom[h.centre];
-        judge(parts, scan, map, matching, registration);
-      }
+  constexpr std::size_t kBlock = 64;
+  workers.run((all.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
+    for (std::size_t i = block * kBlock; i < std::min(all.size(), (block + 1) * kBlock); ++i) {
+      all[i].score = score_of(all[i], parts.near_level_m, map);
     }
-  };
-  std::vector<Hypothesis> best = best_of(std::move(all), kRefined, kOtherPlace);
+  });
+  std::vector<Hypothesis> best = best_of(std::move(all));
   workers.run(best.size(),
               [&](std::size_t i) { best[i] = climbed(best[i], parts.climb_level_m, map); });
-  refine(best);
+  std::vector<Registration> found;
+  for (const Hypothesis& h : best) {
+    const auto T = refined(h, scan, scan.points_base, map, matching, workers);
+    if (T) {
+      Registration& registration = found.emplace_back();
+      registration.T_odom_base = *T;
+      registration.centre = area.centres_odom[h.centre];
+      judge(parts, scan, map, matching, registration);
+    }
+  }
   if (found.empty()) {
     result.obstacle = "the scan matches nowhere";
     return result;
   }
   result.best = best_found(found);
   result.obstacle = obstacle_to(*result.best, area.farthest_m, config);
-  if (!result.obstacle.empty()) {
-    std::vector<Hypothesis> near = around(result.best->T_odom_base, result.best->centre);
-    score(near, parts.climb_level_m, map, kAroundSeen_m, workers);
-    refine(best_of(std::move(near), kRefinedAround, {kSameAround_m, kSameAround_rad}));
-    result.best = best_found(found);
-    result.obstacle = obstacle_to(*result.best, area.farthest_m, config);
-  }
   result.accepted = result.obstacle.empty();
-  result.likely = is_likely(*result.best, area.farthest_m, config);
   return result;
 }
 

@@ -42,25 +42,20 @@ struct Registration {
   double fit{0.0};              ///< of those that meet a plane at all, within 10 cm of it
   double runner_up_share{0.0};  ///< of the best place that is another one
   double chi2{0.0};             ///< per point that lies within 10 cm; near 1 when all is well
-  std::size_t centre{0};        ///< of the search area, from which the search came there ...
-  Pose nearest_centre;          ///< ... and where it is
+  Pose centre;                  ///< of the search area, from which the search came there
 };
 
 struct RegistrationResult {
   std::optional<Registration> best;  ///< also when it is not accepted
   bool accepted{false};
-  /// Worth to be believed when a search with newer sweeps comes to the same place. In foliage few
-  /// points lie within 10 cm of the map at the true place too.
-  bool likely{false};
   std::string obstacle;  ///< why it is not
 };
 
 /// A grid of places and headings, each put on the ground, is scored with some hundred points that
 /// stand out of the ground; the best few, apart from each other, climb within their cell of the
-/// grid and are refined with the iterated matcher against all points. Where none of them is
-/// accepted every place around the best is tried too. Accepted only when most of the points that
-/// stand out lie on the map, clearly more than at any other place. Deterministic for any number of
-/// workers.
+/// grid and are refined with the iterated matcher against all points. Accepted only when most of
+/// the points that stand out lie on the map, clearly more than at any other place. Deterministic
+/// for any number of workers.
 RegistrationResult register_scan(const LevelScan& scan,
                                  const LocalMap& map,
                                  const SearchArea& area,

@@ -29,6 +29,7 @@ constexpr double kMoment_s = 2.0;
 constexpr std::size_t kSweepsAtOnce = 2;
 /// From the predicted place, when it was left this moment.
 constexpr double kAtOnce_m = 0.5;
+constexpr double kSigmas = 2.0;
 constexpr double kAcceleration_mps2 = 1.0;
 constexpr double kVelocitySigma_mps = 0.2;
 /// The heading's rate while nobody looked is taken from so much of the IMU after it.
@@ -38,9 +39,6 @@ constexpr double kTurned_rad = 0.2;
 /// far beyond are looked at too, as far apart as a registration finds its way between.
 constexpr double kTurnedBeyond_rad = 0.2;
 constexpr double kTurnedStep_rad = 0.08;
-/// Two searches with different sweeps came to the same place.
-constexpr double kConfirmed_m = 0.3;
-constexpr double kConfirmed_rad = 0.03;
 /// A map that was loaded around one place serves those so near to it as well.
 constexpr double kSameMap_m = 5.0;
 /// Of a registered pose, before the first scan is matched.
@@ -265,7 +263,7 @@ Resumption::Found Resumption::compose(const StartResult& start,
                 "; %.0f %% of what stands out lies on the map, %.0f %% at the next best place",
                 100.0 * registration.share,
                 100.0 * registration.runner_up_share);
-  found.text = offset_text(registration.nearest_centre, registration.T_odom_base) + fit;
+  found.text = offset_text(registration.centre, registration.T_odom_base) + fit;
   return found;
 }
 
@@ -305,18 +303,12 @@ std::optional<Resumption::Found> Resumption::attempt_at_once(const Pose& T_base_
   const Pose T_first_newest = start.initial.state.T_odom_base.inverse() * gathered.T_new_base;
   const double turned_rad = away_s * turn_radps;
   // No grid is searched: what fits elsewhere may have a better twin that nobody looked at.
-  const double farthest_m = kAtOnce_m + away_s * (kVelocitySigma_mps + kAcceleration_mps2 * away_s);
+  const double farthest_m =
+      kAtOnce_m + kSigmas * away_s * (kVelocitySigma_mps + 0.5 * kAcceleration_mps2 * away_s);
   SearchArea straight_on{{predicted_place(away_s, turned_rad, T_first_newest)}};
   SearchArea turned = other_turns(away_s, turned_rad, T_first_newest);
   straight_on.farthest_m = turned.farthest_m = farthest_m;
   return look_in({straight_on, turned}, start, scan, gathered.T_new_base);
-}
-
-bool Resumption::is_confirmed(const Pose& T_old_new) const {
-  return std::any_of(likely_T_old_new_.begin(), likely_T_old_new_.end(), [&](const Pose& earlier) {
-    return (earlier.p - T_old_new.p).norm() < kConfirmed_m &&
-           earlier.q.angularDistance(T_old_new.q) < kConfirmed_rad;
-  });
 }
 
 std::optional<Resumption::Found> Resumption::look_in(const std::vector<SearchArea>& areas,
@@ -325,7 +317,6 @@ std::optional<Resumption::Found> Resumption::look_in(const std::vector<SearchAre
                                                      const Pose& T_new_base) {
   Workers workers(static_cast<std::size_t>(config_.matching.threads));
   std::unique_ptr<LocalMap> map;
-  std::vector<Pose> likely;
   Vector3d loaded_at_m = Vector3d::Zero();
   for (const SearchArea& area : areas) {
     const Vector3d& centre_m = area.centres_odom.front().p;
@@ -336,16 +327,12 @@ std::optional<Resumption::Found> Resumption::look_in(const std::vector<SearchAre
     }
     const RegistrationResult result =
         register_scan(scan, *map, area, config_.matching, config_.recovery, workers);
-    if (result.accepted || result.likely) {
+    if (result.accepted) {
       const Pose T_old_new = result.best->T_odom_base * T_new_base.inverse();
-      if (result.accepted || is_confirmed(T_old_new)) {
-        return compose(start, T_old_new, *result.best, std::move(map));
-      }
-      likely.push_back(T_old_new);
+      return compose(start, T_old_new, *result.best, std::move(map));
     }
     obstacle_ += (obstacle_.empty() ? "" : "; elsewhere: ") + result.obstacle;
   }
-  likely_T_old_new_.insert(likely_T_old_new_.end(), likely.begin(), likely.end());
   return std::nullopt;
 }
 

@@ -71,8 +71,6 @@ class Resumption {
   /// The same with other angles turned.
   SearchArea other_turns(double away_s, double turned_rad, const Pose& T_first_newest) const;
   StartResult going_on(Nanoseconds stamp_ns) const;
-  /// An earlier search thought it likely too.
-  bool is_confirmed(const Pose& T_old_new) const;
   std::optional<Found> look_in(const std::vector<SearchArea>& areas,
                                const StartResult& start,
                                const LevelScan& scan,
@@ -90,7 +88,6 @@ class Resumption {
   std::int64_t attempts_{0};
   std::size_t next_at_{0};
   std::string obstacle_;
-  std::vector<Pose> likely_T_old_new_;
 };
 
 /// Offset in the plane, height and heading as a sentence part.

@@ -28,6 +28,12 @@ constexpr double kGatePerRootRange = 1.0 / 9.0;
 /// Planes of few points look thinner than they are.
 constexpr double kLeastVariance_m2 = 0.01 * 0.01;
 
+/// A window over foliage has a plane too, through crowns and gaps; what its points scatter by is
+/// more than measuring and averaging leave of a surface.
+bool is_rough(const PlaneMatch& plane) {
+  return plane.thickness2_m2 > kLeastVariance_m2;
+}
+
 /// E[n n^T] of a normal whose direction has variance tilt2 exceeds the true one by this.
 void add_noise(const Vector3d& normal, double weighted_tilt2, Eigen::Matrix3d& noise) {
   noise -= weighted_tilt2 * normal * normal.transpose();
@@ -164,12 +170,14 @@ void ScanMatcher::refresh(std::size_t i, const Viewpoint& view, const MapOrigins
   if (!kept) {
     r.looked_up_at_odom_m = point_odom_m;
     found_[i] = look_up(&LocalMap::match_surface, r);
+    r.is_of_nearest = false;
   }
-  const bool ask_nearest = also_nearest_ && found_[i] == Found::kNothing;
+  const bool has_no_surface = found_[i] == Found::kNothing ||
+                              (found_[i] == Found::kPlane && !r.is_of_nearest && is_rough(r.plane));
+  const bool ask_nearest = also_nearest_ && has_no_surface;
   if (ask_nearest) {
-    found_[i] = look_up(&LocalMap::match_nearest, r);
-    r.is_of_nearest = found_[i] == Found::kPlane;
-    found_[i] = found_[i] == Found::kNothing ? Found::kMisfit : found_[i];
+    r.is_of_nearest = look_up(&LocalMap::match_nearest, r) == Found::kPlane;
+    found_[i] = r.is_of_nearest ? Found::kPlane : Found::kNoNearest;
   }
   if (origins != nullptr && found_[i] == Found::kPlane && (!kept || ask_nearest)) {
     r.origin = origins->find(r.looked_up_at_odom_m);
@@ -327,7 +335,7 @@ void ScanMatcher::forget_judgement() {
   also_nearest_ = false;
   open_ = {};
   for (std::size_t i = 0; i < residuals_.size(); ++i) {
-    if (std::exchange(residuals_[i].is_of_nearest, false)) {
+    if (std::exchange(residuals_[i].is_of_nearest, false) || found_[i] == Found::kNoNearest) {
       found_[i] = Found::kNotAsked;
     }
   }

@@ -36,7 +36,7 @@ class ScanMatcher {
 
   /// Looks up the planes of the points that have moved, since they were looked up, by more than
   /// planes can forgive; else only residuals and weights are new. Where surfaces leave the pose
-  /// open, points without one are matched with their nearest points.
+  /// open, points without one, or with a rough one, are matched with their nearest points.
   PoseInformation linearise(const Pose& T_odom_base);
 
   /// The same with the extrinsic as unknown, r = n . (R (R_bl p_l + t_bl) + p) + d. Where the map's
@@ -103,7 +103,7 @@ class ScanMatcher {
 
   using Ask = bool (LocalMap::*)(const Eigen::Vector3d&, PlaneMatch&) const;
 
-  enum class Found : std::uint8_t { kNotAsked, kNothing, kMisfit, kPlane };
+  enum class Found : std::uint8_t { kNotAsked, kNothing, kNoNearest, kMisfit, kPlane };
 
   void refresh(std::size_t i, const Viewpoint& view, const MapOrigins* origins);
   Found look_up(Ask ask, Residual& residual) const;

@@ -38,8 +38,12 @@ constexpr double kVelocityUnseen_mps = 2.0;
 /// with it.
 constexpr int kMostRefinements = 6;
 constexpr double kSettled_mps = 0.1;
-/// Trials that began with different speeds and end so near to each other found the same one.
-constexpr double kAgreeing_mps = 0.5;
+/// Trials that began a step or more apart and end so near to each other, in steps, found the same
+/// speed.
+constexpr double kAgreeing = 0.25;
+/// The share of points that a speed beside walls reaches of that which rings on the ground give to
+/// standing still.
+constexpr double kNearlyAsGood = 0.85;
 constexpr int kTrials = 3;
 
 Eigen::Quaterniond without_yaw(const Eigen::Quaterniond& q) {
@@ -88,11 +92,12 @@ struct FirstVelocity {
   bool is_seen;  ///< by the sweeps, along base x
 };
 
-/// Zero unless a forward speed explains the second sweep clearly better, or several speeds lead to
-/// one and the sweep does not lock to standing still. A speed counts only where the sweep
+/// Zero unless a forward speed explains the second sweep clearly better, or several trials lead to
+/// one speed and the sweep does not lock to standing still. A speed counts only where the sweep
 /// determines it: on a plain all fit alike, and by which of them more points find a plane is
 /// chance. A robot that stands sees also that; beside long walls, on which most of a scan fits at
-/// any speed, the rings on the ground make standing still fit better than driving does.
+/// any speed, the rings on the ground make standing still fit better than driving does, by a tenth.
+/// Cars that come along fit at their speed, but the ground does not.
 FirstVelocity find_velocity(const Config& config,
                             const Pose& T_base_lidar,
                             const ImuBuffer& imu,
@@ -107,7 +112,7 @@ FirstVelocity find_velocity(const Config& config,
     return trial.forward_sigma_mps < kUnseenSpeed * step_mps;
   };
   const auto refined = [&](Trial trial) {
-    for (int i = 0; i < kMostRefinements; ++i) {
+    for (int i = 0; i < kMostRefinements && sees_speed(trial); ++i) {
       const Vector3d tried_mps = trial.v_base_mps;
       trial = attempt(tried_mps);
       if ((trial.v_base_mps - tried_mps).norm() < kSettled_mps) {
@@ -116,27 +121,31 @@ FirstVelocity find_velocity(const Config& config,
     }
     return trial;
   };
-  const Trial standing = refined(attempt(Vector3d::Zero()));
-  std::vector<Trial> moving;
+  const Trial from_rest = refined(attempt(Vector3d::Zero()));
+  const bool sees_rest = sees_speed(from_rest);
+  std::vector<Trial> seen;
   for (double speed = -kBackwardSpeed_mps; speed <= config.start.max_speed_mps; speed += step_mps) {
-    const Trial first = attempt(speed * Vector3d::UnitX());
-    if (sees_speed(first)) {
-      moving.push_back(refined(first));
+    const Trial trial = refined(attempt(speed * Vector3d::UnitX()));
+    if (sees_speed(trial)) {
+      seen.push_back(trial);
     }
   }
-  std::erase_if(moving, [&](const Trial& trial) { return !sees_speed(trial); });
-  const auto best = std::max_element(
-      moving.begin(), moving.end(), [](const auto& a, const auto& b) { return a.share < b.share; });
-  if (best == moving.end()) {
-    return {standing.v_base_mps, sees_speed(standing)};
+  const auto agreeing = [&](const Trial& trial) {
+    return std::count_if(seen.begin(), seen.end(), [&](const Trial& other) {
+      return (other.v_base_mps - trial.v_base_mps).norm() < kAgreeing * step_mps;
+    });
+  };
+  const FirstVelocity rest{sees_rest ? from_rest.v_base_mps : Vector3d::Zero(), sees_rest};
+  const Trial* best = nullptr;
+  for (const Trial& trial : seen) {
+    const bool is_clear = trial.share > from_rest.share + kClearlyBetter;
+    const bool locks_only_there =
+        !sees_rest && agreeing(trial) > 1 && trial.share > kNearlyAsGood * from_rest.share;
+    if ((is_clear || locks_only_there) && (best == nullptr || trial.share > best->share)) {
+      best = &trial;
+    }
   }
-  const auto agreeing = std::count_if(moving.begin(), moving.end(), [&](const Trial& trial) {
-    return (trial.v_base_mps - best->v_base_mps).norm() < kAgreeing_mps;
-  });
-  const bool locks_only_there = !sees_speed(standing) && agreeing > 1;
-  return locks_only_there || best->share > standing.share + kClearlyBetter
-             ? FirstVelocity{best->v_base_mps, true}
-             : FirstVelocity{standing.v_base_mps, sees_speed(standing)};
+  return best != nullptr ? FirstVelocity{best->v_base_mps, true} : rest;
 }
 
 /// A start as a trial run over the waiting sweeps corrects it.
@@ -169,9 +178,11 @@ Relevelled relevel(const Config& config,
   }
   const Eigen::Quaterniond q_base_odom = initial.state.T_odom_base.q.conjugate();
   const double variance = filter.covariance().diagonal().segment<2>(error::kGravity).maxCoeff();
-  const Vector3d moved_m = filter.state().T_odom_base.p - initial.state.T_odom_base.p;
+  Vector3d moved_m = filter.state().T_odom_base.p - initial.state.T_odom_base.p;
+  moved_m.z() = 0.0;
+  const Vector3d way = moved_m.normalized();
   const Matrix3d moved_m2 = filter.covariance().block<3, 3>(error::kPosition, error::kPosition);
-  const double moved_sigma_m = std::sqrt(moved_m.normalized().dot(moved_m2 * moved_m.normalized()));
+  const double moved_sigma_m = std::sqrt(std::max(0.0, way.dot(moved_m2 * way)));
   return {q_base_odom * filter.state().gravity_odom_mps2,
           q_base_odom * (filter.state().v_odom_mps - unaided.v_odom_mps),
           kTrialSigmaFactor * std::sqrt(variance),
@@ -342,14 +353,18 @@ StartResult start(const Config& configured,
   const auto stands = [&] {
     return is_quiet && !has_moved && v_base.norm() < config.start.rest_speed_mps;
   };
-  const auto relevelled = [&] {
-    return relevel(
-        config, T_base_lidar, imu, sweeps, with_velocity(result.initial, v_base, v_sigma_mps));
+  const auto relevelled = [&](const Vector3d& from_v_base_mps) {
+    return relevel(config,
+                   T_base_lidar,
+                   imu,
+                   sweeps,
+                   with_velocity(result.initial, from_v_base_mps, v_sigma_mps));
   };
   // Who drives off evenly seems to lean.
-  has_moved = stands() && relevelled().has_moved;
+  has_moved = stands() && relevelled(Vector3d::Zero()).has_moved;
   for (int i = 0; i < kTrials && !stands(); ++i) {
-    const Relevelled found = relevelled();
+    const Relevelled found = relevelled(v_base);
+    has_moved = found.has_moved;
     v_base = found.v_base_mps;
     // The prior of the next trial is as open as the first one's: the same data must not count
     // twice.
