@@ -40,6 +40,9 @@ class LocalMap {
     return false;
   }
 
+  /// Whether match_nearest() may find what match_surface() does not.
+  virtual bool has_nearest() const { return false; }
+
   virtual void insert(const PointCloud& points_odom) = 0;
   /// Forgets what lies outside the axis-aligned cube around `center_odom_m`.
   virtual void prune(const Eigen::Vector3d& center_odom_m, double half_side_m) = 0;

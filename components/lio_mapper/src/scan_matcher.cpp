@@ -28,12 +28,6 @@ constexpr double kGatePerRootRange = 1.0 / 9.0;
 /// Planes of few points look thinner than they are.
 constexpr double kLeastVariance_m2 = 0.01 * 0.01;
 
-/// A window over foliage has a plane too, through crowns and gaps; what its points scatter by is
-/// more than measuring and averaging leave of a surface.
-bool is_rough(const PlaneMatch& plane) {
-  return plane.thickness2_m2 > kLeastVariance_m2;
-}
-
 /// E[n n^T] of a normal whose direction has variance tilt2 exceeds the true one by this.
 void add_noise(const Vector3d& normal, double weighted_tilt2, Eigen::Matrix3d& noise) {
   noise -= weighted_tilt2 * normal * normal.transpose();
@@ -161,6 +155,14 @@ ScanMatcher::Found ScanMatcher::look_up(Ask ask, Residual& r) const {
   return fits ? Found::kPlane : Found::kMisfit;
 }
 
+/// A window over foliage has a plane too, through crowns and gaps; what its points scatter by is
+/// more than measuring and averaging leave of a surface.
+bool ScanMatcher::needs_nearest(Found found, const Residual& r) const {
+  const bool is_rough = r.plane.thickness2_m2 > kLeastVariance_m2;
+  return found == Found::kNothing ||
+         (found == Found::kPlane && !r.is_of_nearest && is_rough && map_.has_nearest());
+}
+
 /// A point that moved little since it was looked up keeps what was found.
 void ScanMatcher::refresh(std::size_t i, const Viewpoint& view, const MapOrigins* origins) {
   Residual& r = residuals_[i];
@@ -172,9 +174,7 @@ void ScanMatcher::refresh(std::size_t i, const Viewpoint& view, const MapOrigins
     found_[i] = look_up(&LocalMap::match_surface, r);
     r.is_of_nearest = false;
   }
-  const bool has_no_surface = found_[i] == Found::kNothing ||
-                              (found_[i] == Found::kPlane && !r.is_of_nearest && is_rough(r.plane));
-  const bool ask_nearest = also_nearest_ && has_no_surface;
+  const bool ask_nearest = also_nearest_ && needs_nearest(found_[i], r);
   if (ask_nearest) {
     r.is_of_nearest = look_up(&LocalMap::match_nearest, r) == Found::kPlane;
     found_[i] = r.is_of_nearest ? Found::kPlane : Found::kNoNearest;

@@ -107,6 +107,7 @@ class ScanMatcher {
 
   void refresh(std::size_t i, const Viewpoint& view, const MapOrigins* origins);
   Found look_up(Ask ask, Residual& residual) const;
+  bool needs_nearest(Found found, const Residual& residual) const;
   bool is_judgement_due(const Pose& T_odom_base) const;
   void forget_judgement();
   static bool leaves_pose_open(const Matrix6d& information);

@@ -82,8 +82,9 @@ void ScanMatcher::add_pulls(Viewpoint view,
     }
     Residual r = residuals_[i];
     r.looked_up_at_odom_m = view.R_odom_base * r.point_base_m + view.T_odom_base.p;
+    r.is_of_nearest = false;
     Found found = look_up(&LocalMap::match_surface, r);
-    if (found == Found::kNothing) {
+    if (needs_nearest(found, r)) {
       found = look_up(&LocalMap::match_nearest, r);
     }
     if (found == Found::kNothing) {

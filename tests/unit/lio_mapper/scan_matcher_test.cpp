@@ -32,7 +32,7 @@ class Room final : public UnchangingMap {
     }
     plane.normal = Eigen::Vector3d::Unit(axis);
     plane.offset_m = p[axis] < 0.0 ? 4.0 : -4.0;
-    plane.thickness2_m2 = 1e-4;
+    plane.thickness2_m2 = thickness2_m2;
     plane.tilt2_rad2 = 0.0;
     return true;
   }
@@ -42,6 +42,10 @@ class Room final : public UnchangingMap {
     return false;
   }
 
+  bool has_nearest() const override { return keeps_points; }
+
+  double thickness2_m2{1e-4};
+  bool keeps_points{false};
   mutable std::atomic<int> surfaces_asked{0};
   mutable std::atomic<int> nearest_asked{0};
 
@@ -95,6 +99,17 @@ TEST(ScanMatcher,
   m.matcher.linearise(Pose{});
   EXPECT_EQ(m.room.surfaces_asked, kPoints);
   EXPECT_EQ(m.room.nearest_asked, 2 * kAWall);
+}
+
+TEST(ScanMatcher, rough_surfaces_give_way_to_the_nearest_points_of_a_map_that_keeps_points) {
+  for (const bool keeps_points : {false, true}) {
+    Matching m(false);
+    m.room.thickness2_m2 = 4e-4;
+    m.room.keeps_points = keeps_points;
+    const PoseInformation sum = m.matcher.linearise(Pose{});
+    EXPECT_EQ(m.room.nearest_asked, keeps_points ? kPoints : 2 * kAWall);
+    EXPECT_EQ(sum.count, static_cast<std::size_t>(keeps_points ? 0 : 4 * kAWall));
+  }
 }
 
 TEST(ScanMatcher, looks_up_again_only_the_points_that_moved_by_five_centimetres) {
