@@ -125,7 +125,7 @@ FirstVelocity find_velocity(const Config& config,
   const bool sees_rest = sees_speed(from_rest);
   std::vector<Trial> seen;
   for (double speed = -kBackwardSpeed_mps; speed <= config.start.max_speed_mps; speed += step_mps) {
-    const Trial trial = refined(attempt(speed * Vector3d::UnitX()));
+    const Trial trial = speed == 0.0 ? from_rest : refined(attempt(speed * Vector3d::UnitX()));
     if (sees_speed(trial)) {
       seen.push_back(trial);
     }

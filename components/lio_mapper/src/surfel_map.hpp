@@ -36,7 +36,9 @@ class SurfelMap final : public LocalMap {
 
   bool match_surface(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) const override;
   bool match_nearest(const Eigen::Vector3d& point_odom_m, PlaneMatch& plane) const override;
+
   bool has_nearest() const override { return config_.nearest_points; }
+
   void insert(const PointCloud& points_odom) override;
   void prune(const Eigen::Vector3d& center_odom_m, double half_side_m) override;
   /// Leaf means keep their weights; leaves are laid anew, the means as their single points.

@@ -18,15 +18,10 @@ constexpr double kSameWay_m = 0.3;
 /// started with the robot.
 void expect_same_way(const ResumeDrive& drive, std::size_t at) {
   ASSERT_LT(at, drive.scans.size());
-  const Nanoseconds from_ns = drive.scans[at].odometry.stamp_ns;
   lio_mapper::LioMapper mapper({}, drive.robot);
   std::vector<lio_mapper::ScanResult> scans;
   Events events;
-  for (const recording::LogEntry& entry : drive.entries) {
-    if (entry.receive_ns > from_ns && entry.receive_ns < from_ns + from_seconds(kFor_s)) {
-      feed(mapper, entry, scans, events);
-    }
-  }
+  feed_from(mapper, drive, drive.scans[at].odometry.stamp_ns, kFor_s, scans, events);
   ASSERT_GT(scans.size(), 20U);
   const lio_mapper::ScanResult& first = scans.front();
   const lio_mapper::ScanResult& last = scans.back();

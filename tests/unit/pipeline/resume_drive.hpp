@@ -86,6 +86,20 @@ struct ResumeDrive {
   Events events;
 };
 
+/// What was measured between two moments.
+inline void feed_from(lio_mapper::LioMapper& mapper,
+                      const ResumeDrive& drive,
+                      Nanoseconds from_ns,
+                      double duration_s,
+                      std::vector<lio_mapper::ScanResult>& scans,
+                      Events& events) {
+  for (const recording::LogEntry& entry : drive.entries) {
+    if (entry.receive_ns > from_ns && entry.receive_ns < from_ns + from_seconds(duration_s)) {
+      feed(mapper, entry, scans, events);
+    }
+  }
+}
+
 struct Resumed {
   std::vector<lio_mapper::ScanResult> scans;
   Events events;
@@ -100,11 +114,7 @@ inline Resumed resume(const ResumeDrive& drive,
   Resumed resumed;
   lio_mapper::LioMapper mapper({}, drive.robot);
   mapper.resume(checkpoint, points);
-  for (const recording::LogEntry& entry : drive.entries) {
-    if (entry.receive_ns > from_ns && entry.receive_ns < from_ns + from_seconds(duration_s)) {
-      feed(mapper, entry, resumed.scans, resumed.events);
-    }
-  }
+  feed_from(mapper, drive, from_ns, duration_s, resumed.scans, resumed.events);
   auto rest = mapper.finish();
   std::move(rest.scans.begin(), rest.scans.end(), std::back_inserter(resumed.scans));
   return resumed;
