@@ -204,11 +204,8 @@ void describe_recovery(RecoveryConfig& c, ConfigFields& f) {
   f.number("yaw_rad", c.yaw_rad, "farthest from the predicted heading", {0.0, 3.1416});
   f.number("min_share",
            c.min_share,
-           "of the points that stand out of the ground, within 10 cm of the map",
-           {0.0, 1.0});
-  f.number("min_fit",
-           c.min_fit,
-           "the same of those of them that meet a plane of the map: sparse maps have gaps",
+           "how well the points that stand out of the ground must lie on the map: mean of "
+           "exp(-d^2 / (2 (0.25 m)^2)), d to its nearest point",
            {0.0, 1.0});
   f.number("min_lead", c.min_lead, "of that share over any other place", {0.0, 1.0});
   f.integer("attempts",

@@ -6,6 +6,7 @@
 
 #include "ground_grid.hpp"
 #include "iterated_update.hpp"
+#include "likelihood_field.hpp"
 #include "scan_matcher.hpp"
 
 #include <algorithm>
@@ -20,33 +21,42 @@ using Eigen::Vector3d;
 
 namespace {
 
-constexpr double kStep_m = 0.75;       // of the grid; planes are seen from 0.5 m
+constexpr double kStep_m = 0.5;        // of the grid: two sigmas of the field
 constexpr double kYawStep_rad = 0.05;  // 0.6 m at half a step and 25 m
 constexpr double kNear_m = 25.0;       // farther points would fall through the grid of headings
-constexpr double kSeen_m = 0.5;        // a point this far from its plane counts nothing
+constexpr double kFar_m = 50.0;        // where too little is near, and headings as much finer
 constexpr double kGroundRadius_m = 12.0;
 constexpr double kStandsOut_m = 0.5;  // above the ground
-constexpr std::size_t kCoarsePoints = 150;
+constexpr std::size_t kCoarsePoints = 200;
 constexpr std::size_t kClimbPoints = 500;
-constexpr std::size_t kFinePoints = 1500;
+constexpr std::size_t kJudgedPoints = 2000;
+constexpr std::size_t kRefinedPoints = 3000;
 constexpr std::size_t kFewestPoints = 80;
-constexpr std::size_t kRefined = 16;
-/// The best places of the grid climb so often at half the steps, within a step of the grid: between
-/// poles and trees the matcher finds its way over some centimetres only.
+/// The best places of the grid climb, and the best hills' too: so often at half the steps, within a
+/// step of the grid.
+constexpr std::size_t kClimbing = 8;
 constexpr int kHalvings = 3;
 constexpr int kMostClimbs = 4;  // at steps of one size
-/// Two places or headings that differ by less are the same one.
-constexpr double kSame_m = 1.0;
-constexpr double kSame_rad = 0.05;
-constexpr double kFoundOnPlane_m = 0.1;
+/// Of the grid's places that climb, none is so near to a better one.
+constexpr double kNeighbour_m = 1.0;
+constexpr double kNeighbour_rad = 0.1;
+/// Two places or headings that differ by less are on one hill of the field.
+constexpr double kSame_m = 2.0;
+constexpr double kSame_rad = 0.2;
+/// Where the robot must be within the area, its middle is as good as this much more share at the
+/// rim: along a corridor nothing else tells.
+constexpr double kMiddleLead = 0.05;
+/// Centres so near to each other share one field.
+constexpr double kSameField_m = 5.0;
+/// The matcher goes at most so far from the top of the hill: beyond it slid somewhere else.
+constexpr double kRefined_m = 0.5;
+constexpr double kRefined_rad = 0.05;
 constexpr std::int64_t kMaxIterations = 20;
 constexpr int kRounds = 6;
 constexpr double kArrived_m = 0.02;
 constexpr double kPriorPosition_m = 3.0;
 constexpr double kPriorLevel_rad = 0.01;
 constexpr double kPriorYaw_rad = 0.2;
-/// More, and the residuals have not the size that the matcher gives them.
-constexpr double kMostChi2 = 4.0;
 
 struct Hypothesis {
   Vector3d p_odom_m;
@@ -55,13 +65,15 @@ struct Hypothesis {
   double score{0.0};
 };
 
-bool are_same(const Vector3d& a, double yaw_a, const Vector3d& b, double yaw_b) {
-  return (a - b).head<2>().norm() < kSame_m && std::abs(wrap_angle(yaw_a - yaw_b)) < kSame_rad;
+bool is_near(const Hypothesis& a, const Hypothesis& b, double distance_m, double turn_rad) {
+  return (a.p_odom_m - b.p_odom_m).head<2>().norm() < distance_m &&
+         std::abs(wrap_angle(a.yaw_rad - b.yaw_rad)) < turn_rad;
 }
 
 /// Every n-th, so that at most `most` are left.
-std::vector<Vector3d> thinned(const std::vector<Vector3d>& points, std::size_t most) {
-  std::vector<Vector3d> kept;
+template <typename Points>
+Points thinned(const Points& points, std::size_t most) {
+  Points kept;
   const std::size_t step = std::max<std::size_t>(1, (points.size() + most - 1) / most);
   for (std::size_t i = 0; i < points.size(); i += step) {
     kept.push_back(points[i]);
@@ -71,11 +83,12 @@ std::vector<Vector3d> thinned(const std::vector<Vector3d>& points, std::size_t m
 
 /// The scan in level axes about base, apart into what stands out and the ground.
 struct Parts {
-  double ground_m{0.0};                 ///< height of the ground below base, negative
-  std::size_t count{0};                 ///< stand out, near ones where there are enough of them
-  std::vector<Vector3d> near_level_m;   ///< stand out, for the grid
-  std::vector<Vector3d> climb_level_m;  ///< the same, more of them
-  std::vector<Vector3d> tall_level_m;   ///< stand out, all
+  double ground_m{0.0};                  ///< height of the ground below base, negative
+  double reach_m{kNear_m};               ///< of the points that stand out
+  std::size_t count{0};                  ///< of these
+  std::vector<Vector3d> coarse_level_m;  ///< of these, for the grid,
+  std::vector<Vector3d> climb_level_m;   ///< for climbing
+  std::vector<Vector3d> judged_level_m;  ///< and for the verdict
 };
 
 Parts parts_of(const LevelScan& scan) {
@@ -88,136 +101,235 @@ Parts parts_of(const LevelScan& scan) {
   }
   Parts parts;
   parts.ground_m = grid.height_at(Vector2d::Zero(), kGroundRadius_m).value_or(0.0);
-  for (const Vector3d& point : level) {
-    if (point.z() > parts.ground_m + kStandsOut_m) {
-      parts.tall_level_m.push_back(point);
-      if (point.norm() < kNear_m) {
-        parts.near_level_m.push_back(point);
-      }
-    }
+  std::erase_if(level, [&](const Vector3d& point) {
+    return point.z() <= parts.ground_m + kStandsOut_m || point.norm() >= kFar_m;
+  });
+  const auto is_far = [](const Vector3d& point) { return point.norm() >= kNear_m; };
+  const auto far = static_cast<std::size_t>(std::count_if(level.begin(), level.end(), is_far));
+  if (level.size() - far >= kFewestPoints) {
+    std::erase_if(level, is_far);
+  } else {
+    parts.reach_m = kFar_m;
   }
-  if (parts.near_level_m.size() < kFewestPoints) {
-    parts.near_level_m = parts.tall_level_m;
-  }
-  parts.count = parts.near_level_m.size();
-  parts.climb_level_m = thinned(parts.near_level_m, kClimbPoints);
-  parts.near_level_m = thinned(parts.near_level_m, kCoarsePoints);
-  parts.tall_level_m = thinned(parts.tall_level_m, kFinePoints);
+  parts.count = level.size();
+  parts.coarse_level_m = thinned(level, kCoarsePoints);
+  parts.climb_level_m = thinned(level, kClimbPoints);
+  parts.judged_level_m = thinned(level, kJudgedPoints);
   return parts;
 }
 
-GroundGrid ground_of(const LocalMap& map, const Pose& centre, double radius_m) {
+GroundGrid ground_of(const PointCloud& map_points, const Pose& centre, double radius_m) {
   GroundGrid grid(centre.p.head<2>(), radius_m + kGroundRadius_m);
-  for (const PointXyzi& point : map.points()) {
+  for (const PointXyzi& point : map_points) {
     grid.add(point.position().cast<double>());
   }
   return grid;
 }
 
-void add_grid(const SearchArea& area,
-              std::size_t centre,
-              const LocalMap& map,
-              double scan_ground_m,
-              std::vector<Hypothesis>& all) {
-  const Pose& T = area.centres_odom[centre];
-  const GroundGrid ground = ground_of(map, T, area.radius_m);
-  const std::optional<double> ground_here = ground.height_at(T.p.head<2>(), kGroundRadius_m);
-  const int steps = static_cast<int>(std::ceil(area.radius_m / kStep_m));
-  const int turns = static_cast<int>(std::ceil(area.yaw_rad / kYawStep_rad));
-  for (int x = -steps; x <= steps; ++x) {
-    for (int y = -steps; y <= steps; ++y) {
-      const Vector2d offset_m = kStep_m * Vector2d(x, y);
-      if (offset_m.norm() > area.radius_m + kStep_m) {
-        continue;
-      }
-      const Vector2d place_m = T.p.head<2>() + offset_m;
-      const std::optional<double> height = ground.height_at(place_m, kGroundRadius_m);
-      const double z = height        ? *height - scan_ground_m
-                       : ground_here ? *ground_here - scan_ground_m
-                                     : T.p.z();
-      for (int turn = -turns; turn <= turns; ++turn) {
-        all.push_back({{place_m.x(), place_m.y(), z},
-                       wrap_angle(yaw_of(T.q) + kYawStep_rad * turn),
-                       centre,
-                       0.0});
-      }
-    }
+/// The points at a heading, about the robot.
+std::vector<Vector3d> turned(const std::vector<Vector3d>& level_m, double yaw_rad) {
+  const Eigen::Matrix3d R = from_yaw(yaw_rad).toRotationMatrix();
+  std::vector<Vector3d> result;
+  result.reserve(level_m.size());
+  for (const Vector3d& p : level_m) {
+    result.push_back(R * p);
   }
+  return result;
 }
 
-double score_of(const Hypothesis& h, const std::vector<Vector3d>& level, const LocalMap& map) {
-  const double c = std::cos(h.yaw_rad);
-  const double s = std::sin(h.yaw_rad);
+double mean_likelihood(const LikelihoodField& field,
+                       const std::vector<Vector3d>& turned_m,
+                       const Vector3d& place_odom_m) {
   double sum = 0.0;
-  PlaneMatch plane;
-  for (const Vector3d& p : level) {
-    const Vector3d point_odom_m{c * p.x() - s * p.y() + h.p_odom_m.x(),
-                                s * p.x() + c * p.y() + h.p_odom_m.y(),
-                                p.z() + h.p_odom_m.z()};
-    if (map.match_surface(point_odom_m, plane)) {
-      const double ratio = (plane.normal.dot(point_odom_m) + plane.offset_m) / kSeen_m;
-      sum += std::max(0.0, 1.0 - ratio * ratio);
-    }
+  for (const Vector3d& p : turned_m) {
+    sum += field.at(p + place_odom_m);
   }
-  return sum / static_cast<double>(level.size());
+  return sum / static_cast<double>(turned_m.size());
 }
 
-/// The best ones, none of them the same place as a better one.
-std::vector<Hypothesis> best_of(std::vector<Hypothesis> all) {
-  std::stable_sort(all.begin(), all.end(), [](const Hypothesis& a, const Hypothesis& b) {
-    return a.score > b.score;
-  });
-  std::vector<Hypothesis> best;
-  for (const Hypothesis& h : all) {
-    const bool is_new = std::none_of(best.begin(), best.end(), [&](const Hypothesis& better) {
-      return are_same(h.p_odom_m, h.yaw_rad, better.p_odom_m, better.yaw_rad);
-    });
-    if (is_new) {
-      best.push_back(h);
-    }
-    if (best.size() == kRefined) {
-      break;
+/// The search of one area.
+class Search {
+ public:
+  Search(const SearchArea& area, const Parts& parts, const LocalMap& map, Workers& workers)
+      : area_(area),
+        parts_(parts),
+        map_points_(map.points()),
+        workers_(workers),
+        yaw_step_rad_(kYawStep_rad * kNear_m / parts.reach_m) {
+    for (const Pose& centre : area.centres_odom) {
+      add_field(centre.p);
     }
   }
-  return best;
-}
 
-/// The best place within a step of a hypothesis of the grid.
-Hypothesis climbed(const Hypothesis& start,
-                   const std::vector<Vector3d>& level,
-                   const LocalMap& map) {
-  const auto moved = [&](const Eigen::Vector3d& steps) {
-    Hypothesis h = start;
-    h.p_odom_m.head<2>() += kStep_m * steps.head<2>();
-    h.yaw_rad = wrap_angle(h.yaw_rad + kYawStep_rad * steps.z());
-    h.score = score_of(h, level, map);
-    return h;
-  };
-  Vector3d at = Vector3d::Zero();  // in steps of the grid
-  Hypothesis best = moved(at);
-  double step = 1.0;
-  for (int halving = 0; halving < kHalvings; ++halving) {
-    step *= 0.5;
-    for (int climb = 0; climb < kMostClimbs; ++climb) {
-      const Vector3d from = at;
-      for (int i = 0; i < 6; ++i) {
-        const Vector3d to = from + (i % 2 == 0 ? step : -step) * Vector3d::Unit(i / 2);
-        if (to.cwiseAbs().maxCoeff() > 1.0) {
+  /// The tops of hills of the field, best first.
+  std::vector<Hypothesis> hills() {
+    std::vector<Hypothesis> all;
+    for (std::size_t i = 0; i < area_.centres_odom.size(); ++i) {
+      const std::vector<Hypothesis> here = scored_grid(i);
+      all.insert(all.end(), here.begin(), here.end());
+    }
+    std::stable_sort(all.begin(), all.end(), better);
+    std::vector<Hypothesis> best = best_of(all, kNeighbour_m, kNeighbour_rad);
+    const std::vector<Hypothesis> rivals = best_of(all, kSame_m, kSame_rad);
+    best.insert(best.end(), rivals.begin(), rivals.end());
+    workers_.run(best.size(), [&](std::size_t i) { best[i] = climbed(best[i]); });
+    std::stable_sort(best.begin(), best.end(), better);
+    return best;
+  }
+
+  double share_at(const Pose& T_odom_level, std::size_t centre) const {
+    std::vector<Vector3d> points = parts_.judged_level_m;
+    for (Vector3d& p : points) {
+      p = T_odom_level.q * p;
+    }
+    return mean_likelihood(field_of(centre), points, T_odom_level.p);
+  }
+
+  double share_at(const Hypothesis& h) const {
+    return share_at({from_yaw(h.yaw_rad), h.p_odom_m}, h.centre);
+  }
+
+ private:
+  static bool better(const Hypothesis& a, const Hypothesis& b) { return a.score > b.score; }
+
+  void add_field(const Vector3d& centre_m) {
+    for (std::size_t i = 0; i < field_at_m_.size(); ++i) {
+      if ((field_at_m_[i] - centre_m).norm() < kSameField_m) {
+        field_of_centre_.push_back(i);
+        return;
+      }
+    }
+    field_of_centre_.push_back(fields_.size());
+    field_at_m_.push_back(centre_m);
+    fields_.emplace_back(
+        map_points_, centre_m, parts_.reach_m + area_.radius_m + kSameField_m + kStep_m);
+  }
+
+  const LikelihoodField& field_of(std::size_t centre) const {
+    return fields_[field_of_centre_[centre]];
+  }
+
+  /// What counts for a place beside its likelihood.
+  double lead_of_middle(const Vector3d& place_m, std::size_t centre) const {
+    if (!area_.holds_robot) {
+      return 0.0;
+    }
+    const double away_m = (place_m - area_.centres_odom[centre].p).head<2>().norm();
+    const double ratio = away_m / area_.radius_m;
+    return kMiddleLead * (1.0 - ratio * ratio);
+  }
+
+  double score_of(const Vector3d& place_m,
+                  const std::vector<Vector3d>& turned_m,
+                  std::size_t centre) const {
+    return mean_likelihood(field_of(centre), turned_m, place_m) + lead_of_middle(place_m, centre);
+  }
+
+  /// Places about a centre, each put on the ground.
+  std::vector<Vector3d> places_about(std::size_t centre) const {
+    const Pose& T = area_.centres_odom[centre];
+    const GroundGrid ground = ground_of(map_points_, T, area_.radius_m);
+    const std::optional<double> ground_here = ground.height_at(T.p.head<2>(), kGroundRadius_m);
+    const int steps = static_cast<int>(std::ceil(area_.radius_m / kStep_m));
+    std::vector<Vector3d> places;
+    for (int x = -steps; x <= steps; ++x) {
+      for (int y = -steps; y <= steps; ++y) {
+        const Vector2d offset_m = kStep_m * Vector2d(x, y);
+        if (offset_m.norm() > area_.radius_m + kStep_m) {
           continue;
         }
-        const Hypothesis next = moved(to);
-        if (next.score > best.score) {
-          best = next;
-          at = to;
-        }
+        const Vector2d place_m = T.p.head<2>() + offset_m;
+        const std::optional<double> height =
+            area_.holds_robot ? std::nullopt : ground.height_at(place_m, kGroundRadius_m);
+        const bool known = !area_.holds_robot && (height || ground_here);
+        const double z = known ? (height ? *height : *ground_here) - parts_.ground_m : T.p.z();
+        places.emplace_back(place_m.x(), place_m.y(), z);
       }
-      if (at == from) {
+    }
+    return places;
+  }
+
+  std::vector<Hypothesis> scored_grid(std::size_t centre) {
+    const std::vector<Vector3d> places = places_about(centre);
+    const int turns = static_cast<int>(std::ceil(area_.yaw_rad / yaw_step_rad_));
+    const auto headings = static_cast<std::size_t>(2 * turns + 1);
+    std::vector<Hypothesis> all(headings * places.size());
+    workers_.run(headings, [&](std::size_t heading) {
+      const double yaw_rad = wrap_angle(yaw_of(area_.centres_odom[centre].q) +
+                                        yaw_step_rad_ * (static_cast<int>(heading) - turns));
+      const std::vector<Vector3d> points = turned(parts_.coarse_level_m, yaw_rad);
+      for (std::size_t i = 0; i < places.size(); ++i) {
+        all[heading * places.size() + i] = {
+            places[i], yaw_rad, centre, score_of(places[i], points, centre)};
+      }
+    });
+    return all;
+  }
+
+  /// The first ones of a sorted list, none of them so near to a better one.
+  static std::vector<Hypothesis> best_of(const std::vector<Hypothesis>& all,
+                                         double apart_m,
+                                         double apart_rad) {
+    std::vector<Hypothesis> best;
+    for (const Hypothesis& h : all) {
+      const bool is_new = std::none_of(best.begin(), best.end(), [&](const Hypothesis& other) {
+        return is_near(h, other, apart_m, apart_rad);
+      });
+      if (is_new) {
+        best.push_back(h);
+      }
+      if (best.size() == kClimbing) {
         break;
       }
     }
+    return best;
   }
-  return best;
-}
+
+  /// The best place within a step of a hypothesis of the grid, its height too.
+  Hypothesis climbed(const Hypothesis& start) const {
+    const auto moved = [&](const Eigen::Vector4d& steps) {
+      Hypothesis h = start;
+      h.p_odom_m += kStep_m * steps.head<3>();
+      h.yaw_rad = wrap_angle(h.yaw_rad + yaw_step_rad_ * steps.w());
+      h.score = score_of(h.p_odom_m, turned(parts_.climb_level_m, h.yaw_rad), h.centre);
+      return h;
+    };
+    Eigen::Vector4d at = Eigen::Vector4d::Zero();  // in steps of the grid
+    Hypothesis best = moved(at);
+    double step = 1.0;
+    for (int halving = 0; halving < kHalvings; ++halving) {
+      step *= 0.5;
+      for (int climb = 0; climb < kMostClimbs; ++climb) {
+        const Eigen::Vector4d from = at;
+        for (int i = 0; i < 8; ++i) {
+          const Eigen::Vector4d to =
+              from + (i % 2 == 0 ? step : -step) * Eigen::Vector4d::Unit(i / 2);
+          if (to.cwiseAbs().maxCoeff() > 1.0) {
+            continue;
+          }
+          const Hypothesis next = moved(to);
+          if (next.score > best.score) {
+            best = next;
+            at = to;
+          }
+        }
+        if (at == from) {
+          break;
+        }
+      }
+    }
+    return best;
+  }
+
+  const SearchArea& area_;
+  const Parts& parts_;
+  PointCloud map_points_;
+  Workers& workers_;
+  double yaw_step_rad_;
+  std::vector<LikelihoodField> fields_;
+  std::vector<Vector3d> field_at_m_;
+  std::vector<std::size_t> field_of_centre_;
+};
 
 std::optional<Pose> refined(const Hypothesis& h,
                             const LevelScan& scan,
@@ -260,90 +372,48 @@ std::optional<Pose> refined(const Hypothesis& h,
   return prior.T_odom_base;
 }
 
-void judge(const Parts& parts,
-           const LevelScan& scan,
-           const LocalMap& map,
-           const MatchingConfig& matching,
-           Registration& registration) {
-  const Pose& T = registration.T_odom_base;
-  const Quaterniond q_odom_level = T.q * scan.q_level_base.conjugate();
-  std::size_t near = 0;
-  std::size_t matched = 0;
-  double chi2 = 0.0;
-  PlaneMatch plane;
-  for (const Vector3d& point : parts.tall_level_m) {
-    const Vector3d point_odom_m = q_odom_level * point + T.p;
-    if (!map.match(point_odom_m, plane)) {
-      continue;
-    }
-    const double r = plane.normal.dot(point_odom_m) + plane.offset_m;
-    const double range_m = point.norm();
-    const double sideways_m = matching.angle_sigma_rad * range_m;
-    const double variance = matching.range_sigma_m * matching.range_sigma_m +
-                            sideways_m * sideways_m + plane.thickness2_m2;
-    ++matched;
-    if (std::abs(r) < kFoundOnPlane_m) {  // what lies farther off speaks against the fit already
-      ++near;
-      chi2 += r * r / variance;
-    }
-  }
-  const auto share_of = [](std::size_t part, std::size_t all) {
-    return static_cast<double>(part) / static_cast<double>(std::max<std::size_t>(1, all));
-  };
-  registration.share = share_of(near, parts.tall_level_m.size());
-  registration.fit = share_of(near, matched);
-  registration.chi2 = chi2 / static_cast<double>(std::max<std::size_t>(1, near));
-}
-
-/// Of several places the one on which most of the scan lies, and how well the next one does.
-Registration best_found(const std::vector<Registration>& found) {
-  Registration best = *std::max_element(
-      found.begin(), found.end(), [](const auto& a, const auto& b) { return a.share < b.share; });
-  for (const Registration& other : found) {
-    if (!are_same(other.T_odom_base.p,
-                  yaw_of(other.T_odom_base.q),
-                  best.T_odom_base.p,
-                  yaw_of(best.T_odom_base.q))) {
-      best.runner_up_share = std::max(best.runner_up_share, other.share);
-    }
-  }
-  return best;
-}
-
-double away_m(const Registration& best) {
-  return (best.T_odom_base.p - best.centre.p).head<2>().norm();
-}
-
 /// Empty when nothing speaks against it.
-std::string obstacle_to(const Registration& best, double farthest_m, const RecoveryConfig& config) {
-  const bool covered = best.share >= config.min_share;
-  const bool fits = best.fit >= config.min_fit;
-  const bool leads = best.share - best.runner_up_share >= config.min_lead;
-  if (!covered || !fits || !leads) {
-    char text[240];
+std::string obstacle_to(const Registration& best,
+                        const Hypothesis& top,
+                        const SearchArea& area,
+                        const RecoveryConfig& config) {
+  const Pose& T = best.T_odom_base;
+  const double slid_m = (T.p - top.p_odom_m).norm();
+  const double turned_rad = std::abs(wrap_angle(yaw_of(T.q) - top.yaw_rad));
+  if (slid_m > kRefined_m || turned_rad > kRefined_rad) {
+    char text[160];
     std::snprintf(text,
                   sizeof text,
-                  "%.0f %% of what stands out lies on the map (at least %.0f needed), which is "
-                  "%.0f %% of what meets a plane (%.0f), and %.0f %% at another place (%.0f less)",
+                  "the best place does not hold: matching its surfaces leads %.2f m and %.3f rad "
+                  "away from it (at most %.2f and %.2f)",
+                  slid_m,
+                  turned_rad,
+                  kRefined_m,
+                  kRefined_rad);
+    return text;
+  }
+  const bool leads = area.holds_robot || best.share - best.runner_up_share >= config.min_lead;
+  if (best.share < config.min_share || !leads) {
+    char text[200];
+    std::snprintf(text,
+                  sizeof text,
+                  "what stands out lies on the map by %.0f %% at the best place (at least %.0f "
+                  "needed) and by %.0f %% at another one (%.0f less needed)",
                   100.0 * best.share,
                   100.0 * config.min_share,
-                  100.0 * best.fit,
-                  100.0 * config.min_fit,
                   100.0 * best.runner_up_share,
                   100.0 * config.min_lead);
     return text;
   }
-  if (away_m(best) > farthest_m) {
+  const double away_m = (T.p - best.centre.p).head<2>().norm();
+  if (area.holds_robot && away_m > area.radius_m + kStep_m) {
     char text[120];
     std::snprintf(text,
                   sizeof text,
                   "the best place is %.1f m from the expected one (at most %.1f)",
-                  away_m(best),
-                  farthest_m);
+                  away_m,
+                  area.radius_m + kStep_m);
     return text;
-  }
-  if (best.chi2 > kMostChi2) {
-    return "residuals are " + std::to_string(best.chi2) + " times as large as their noise";
   }
   return "";
 }
@@ -361,39 +431,29 @@ RegistrationResult register_scan(const LevelScan& scan,
   if (map.empty() || parts.count < kFewestPoints) {
     result.obstacle = map.empty() ? "the map is empty there"
                                   : std::to_string(parts.count) +
-                                        " points stand out of the ground, at least " +
+                                        " points stand out of the ground within 50 m, at least " +
                                         std::to_string(kFewestPoints) + " needed";
     return result;
   }
-  std::vector<Hypothesis> all;
-  for (std::size_t i = 0; i < area.centres_odom.size(); ++i) {
-    add_grid(area, i, map, parts.ground_m, all);
-  }
-  constexpr std::size_t kBlock = 64;
-  workers.run((all.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
-    for (std::size_t i = block * kBlock; i < std::min(all.size(), (block + 1) * kBlock); ++i) {
-      all[i].score = score_of(all[i], parts.near_level_m, map);
-    }
-  });
-  std::vector<Hypothesis> best = best_of(std::move(all));
-  workers.run(best.size(),
-              [&](std::size_t i) { best[i] = climbed(best[i], parts.climb_level_m, map); });
-  std::vector<Registration> found;
-  for (const Hypothesis& h : best) {
-    const auto T = refined(h, scan, scan.points_base, map, matching, workers);
-    if (T) {
-      Registration& registration = found.emplace_back();
-      registration.T_odom_base = *T;
-      registration.centre = area.centres_odom[h.centre];
-      judge(parts, scan, map, matching, registration);
-    }
-  }
-  if (found.empty()) {
+  Search search(area, parts, map, workers);
+  const std::vector<Hypothesis> hills = search.hills();
+  const Hypothesis& top = hills.front();
+  const auto T =
+      refined(top, scan, thinned(scan.points_base, kRefinedPoints), map, matching, workers);
+  if (!T) {
     result.obstacle = "the scan matches nowhere";
     return result;
   }
-  result.best = best_found(found);
-  result.obstacle = obstacle_to(*result.best, area.farthest_m, config);
+  Registration& best = result.best.emplace();
+  best.T_odom_base = *T;
+  best.centre = area.centres_odom[top.centre];
+  best.share = search.share_at({T->q * scan.q_level_base.conjugate(), T->p}, top.centre);
+  for (const Hypothesis& other : hills) {
+    if (!is_near(other, top, kSame_m, kSame_rad)) {
+      best.runner_up_share = std::max(best.runner_up_share, search.share_at(other));
+    }
+  }
+  result.obstacle = obstacle_to(best, top, area, config);
   result.accepted = result.obstacle.empty();
   return result;
 }

@@ -32,16 +32,15 @@ struct SearchArea {
   std::vector<Pose> centres_odom;  ///< roll and pitch do not count
   double radius_m{0.0};            ///< about each of them
   double yaw_rad{0.0};             ///< to either side of its heading
-  /// The best place is not believed when it lies farther than this from its centre, in the plane.
-  double farthest_m{std::numeric_limits<double>::infinity()};
+  /// The robot is known to be in the area: no rival counts, and of places that are as good the
+  /// nearest to its centre. Heights are the centres' own, not the ground's.
+  bool holds_robot{false};
 };
 
 struct Registration {
   Pose T_odom_base;
-  double share{0.0};            ///< of the points that stand out, within 10 cm of their planes
-  double fit{0.0};              ///< of those that meet a plane at all, within 10 cm of it
+  double share{0.0};            ///< mean likelihood of the points that stand out: 1 on the map
   double runner_up_share{0.0};  ///< of the best place that is another one
-  double chi2{0.0};             ///< per point that lies within 10 cm; near 1 when all is well
   Pose centre;                  ///< of the search area, from which the search came there
 };
 
@@ -51,11 +50,11 @@ struct RegistrationResult {
   std::string obstacle;  ///< why it is not
 };
 
-/// A grid of places and headings, each put on the ground, is scored with some hundred points that
-/// stand out of the ground; the best few, apart from each other, climb within their cell of the
-/// grid and are refined with the iterated matcher against all points. Accepted only when most of
-/// the points that stand out lie on the map, clearly more than at any other place. Deterministic
-/// for any number of workers.
+/// Correlative search (Olson, Real-time correlative scan matching, ICRA 2009): a grid of places and
+/// headings, each put on the ground, is scored by where the points that stand out of it come to lie
+/// in the map's likelihood field; the best few climb within their cell of the grid, and the first
+/// is refined with the iterated matcher. Accepted where enough of what stands out lies on the map
+/// and clearly more than at any other place. Deterministic for any number of workers.
 RegistrationResult register_scan(const LevelScan& scan,
                                  const LocalMap& map,
                                  const SearchArea& area,

@@ -35,10 +35,9 @@ constexpr double kVelocitySigma_mps = 0.2;
 /// The heading's rate while nobody looked is taken from so much of the IMU after it.
 constexpr double kTurnWindow_s = 0.2;
 constexpr double kTurned_rad = 0.2;
-/// It may have begun or ended to turn meanwhile: headings on the way to the predicted one and so
-/// far beyond are looked at too, as far apart as a registration finds its way between.
+/// It may have begun or ended to turn meanwhile: headings from the last one to the predicted one
+/// and so far beyond both are looked at.
 constexpr double kTurnedBeyond_rad = 0.2;
-constexpr double kTurnedStep_rad = 0.08;
 /// A map that was loaded around one place serves those so near to it as well.
 constexpr double kSameMap_m = 5.0;
 /// Of a registered pose, before the first scan is matched.
@@ -190,18 +189,6 @@ Pose Resumption::predicted_place(double away_s,
   return predicted * T_first_newest;
 }
 
-SearchArea Resumption::other_turns(double away_s,
-                                   double turned_rad,
-                                   const Pose& T_first_newest) const {
-  SearchArea area;
-  const double most_rad = std::max(0.0, turned_rad) + kTurnedBeyond_rad;
-  for (double other_rad = std::min(0.0, turned_rad) - kTurnedBeyond_rad; other_rad <= most_rad;
-       other_rad += kTurnedStep_rad) {
-    area.centres_odom.push_back(predicted_place(away_s, other_rad, T_first_newest));
-  }
-  return area;
-}
-
 /// A start that takes attitude, speed and biases from the checkpoint, in level axes of its own.
 StartResult Resumption::going_on(Nanoseconds stamp_ns) const {
   const Quaterniond q_own_odom = from_yaw(-yaw_of(checkpoint_.T_odom_base.q));
@@ -302,13 +289,12 @@ std::optional<Resumption::Found> Resumption::attempt_at_once(const Pose& T_base_
   const double turn_radps = turn_rate_radps(imu, start, checkpoint_.gyro_bias_radps);
   const Pose T_first_newest = start.initial.state.T_odom_base.inverse() * gathered.T_new_base;
   const double turned_rad = away_s * turn_radps;
-  // No grid is searched: what fits elsewhere may have a better twin that nobody looked at.
-  const double farthest_m =
+  SearchArea area{{predicted_place(away_s, 0.5 * turned_rad, T_first_newest)}};
+  area.radius_m =
       kAtOnce_m + kSigmas * away_s * (kVelocitySigma_mps + 0.5 * kAcceleration_mps2 * away_s);
-  SearchArea straight_on{{predicted_place(away_s, turned_rad, T_first_newest)}};
-  SearchArea turned = other_turns(away_s, turned_rad, T_first_newest);
-  straight_on.farthest_m = turned.farthest_m = farthest_m;
-  return look_in({straight_on, turned}, start, scan, gathered.T_new_base);
+  area.yaw_rad = 0.5 * std::abs(turned_rad) + kTurnedBeyond_rad;
+  area.holds_robot = true;
+  return look_in({area}, start, scan, gathered.T_new_base);
 }
 
 std::optional<Resumption::Found> Resumption::look_in(const std::vector<SearchArea>& areas,

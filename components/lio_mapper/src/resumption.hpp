@@ -68,8 +68,6 @@ class Resumption {
                                 const Pose& T_first_newest) const;
   /// Of the newest sweep, when the robot went on at its speed and turned evenly.
   Pose predicted_place(double away_s, double turned_rad, const Pose& T_first_newest) const;
-  /// The same with other angles turned.
-  SearchArea other_turns(double away_s, double turned_rad, const Pose& T_first_newest) const;
   StartResult going_on(Nanoseconds stamp_ns) const;
   std::optional<Found> look_in(const std::vector<SearchArea>& areas,
                                const StartResult& start,

@@ -126,9 +126,8 @@ struct KeyframeConfig {
 struct RecoveryConfig {
   double radius_m{10.0};     ///< about the predicted place
   double yaw_rad{0.5236};    ///< to either side of the predicted heading
-  double min_share{0.3};     ///< of the points that stand out, within 10 cm of the map
-  double min_fit{0.7};       ///< the same of those of them that meet a plane of the map
-  double min_lead{0.1};      ///< of that share over any other place
+  double min_share{0.35};    ///< mean likelihood, by the map, of the points that stand out
+  double min_lead{0.15};     ///< of that over any other place
   std::int64_t attempts{3};  ///< of a restart, half a second of sweeps apart
   double give_up_s{10.0};    ///< of a lost track with usable sweeps, until odom begins anew
 };
