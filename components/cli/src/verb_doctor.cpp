@@ -72,8 +72,8 @@ int tell_incomplete_datagrams(std::optional<std::int64_t> failed_before) {
 int examine_bus(const DoctorOptions& options) {
   const shell::EventLog log("doctor");
   const SystemConfig config = load_config_of(options.input);
-  std::cout << "DDS domain " << bus::domain_of(config.bus) << ", listening for " << options.seconds
-            << " s\n";
+  const int domain = bus::domain_of(config.bus);  // throws: before half a line is printed
+  std::cout << "DDS domain " << domain << ", listening for " << options.seconds << " s\n";
   std::vector<bus::DiscoveredEndpoint> endpoints;
   const auto failed_before = failed_reassemblies();
   const auto surveys = recording::survey_bus(
