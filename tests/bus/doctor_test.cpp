@@ -45,9 +45,9 @@ class Publishing {
   std::thread thread_;
 };
 
-tests::CommandResult doctor(const Config& config) {
+tests::CommandResult doctor(const Config& config, const std::string& seconds = "3") {
   return tests::run_command(
-      {std::string(TRIGPOINT_BIN_DIR) + "/trigpoint", "doctor", "--seconds", "3"},
+      {std::string(TRIGPOINT_BIN_DIR) + "/trigpoint", "doctor", "--seconds", seconds},
       60s,
       {{"ROS_DOMAIN_ID", std::to_string(config.domain_id)}});
 }
@@ -138,6 +138,80 @@ TEST(Doctor, finds_nothing_wrong_where_nothing_is) {
               AllOf(HasSubstr("writes datum, gps/fix, imu/data"),
                     Not(HasSubstr("! imu")),
                     Not(HasSubstr("trigpoint (process"))));
+}
+
+// ---- programs that say nothing ------------------------------------------------------------------
+
+/// As a mapper that is busy with one long piece of work: found, and silent on all its topics.
+TEST(Doctor, names_a_mapper_that_is_there_and_says_nothing_while_its_inputs_come) {
+  Config config = testing::own_domain();
+  config.network_interface.clear();
+  Participant sensors(config, "sensors");
+  Publisher imu(sensors, topics::imu);
+  Publisher clouds(sensors, topics::points);
+  Participant mapper(config, "mapper");
+  const Publisher odometry(mapper, topics::lio_odometry);
+  const Publisher word(mapper, topics::diagnostics);
+  Publisher status(mapper, topics::lio_status);
+  std::atomic<bool> tells{false};
+  const Publishing publishing([&](Nanoseconds now_ns) {
+    imu.publish(to_message(imu_at_rest(now_ns, 9.81, 0.5)));
+    clouds.publish(to_message(to_cloud_message({{5.0F, 0.0F, 0.0F, 1.0F}}, now_ns, "lidar")));
+    if (tells) {
+      LioStatus lost;
+      lost.health = LioHealth::kLost;
+      status.publish(to_message(lost));
+    }
+  });
+  const auto silent = doctor(config, "5");
+  EXPECT_EQ(silent.exit_code, 1);
+  EXPECT_THAT(silent.output,
+              AllOf(HasSubstr("! lio/status: "),
+                    HasSubstr("is there and has said nothing for "),
+                    HasSubstr("(on diagnostics, lio/odometry, lio/status), while points and "
+                              "imu/data come: it looks for its place in the map")));
+  tells = true;
+  const auto lost = doctor(config, "5");
+  EXPECT_EQ(lost.exit_code, 1);
+  EXPECT_THAT(lost.output,
+              AllOf(Not(HasSubstr("has said nothing")),
+                    HasSubstr("has told of no track for "),
+                    HasSubstr("LOST: it is looking for its place in its map")));
+}
+
+TEST(Doctor, names_a_program_that_is_stopped_before_or_while_it_listens) {
+  const std::string domain = tests::own_domain();
+  const tests::Command gate({std::string(TRIGPOINT_BIN_DIR) + "/trigpoint_fusion_gate"},
+                            {{"ROS_DOMAIN_ID", domain}});
+  for (int i = 0; i < 100 && gate.output_so_far().find("ready") == std::string::npos; ++i) {
+    std::this_thread::sleep_for(100ms);
+  }
+  const std::string process = std::to_string(gate.pid());
+  tests::Command listening(
+      {std::string(TRIGPOINT_BIN_DIR) + "/trigpoint", "doctor", "--seconds", "6"},
+      {{"ROS_DOMAIN_ID", domain}});
+  std::this_thread::sleep_for(2500ms);
+  gate.signal(SIGSTOP);
+  const auto meanwhile = listening.wait(60s);
+  EXPECT_EQ(meanwhile.exit_code, 1);
+  EXPECT_THAT(meanwhile.output,
+              AllOf(HasSubstr("! fusion/status: trigpoint_fusion_gate (process " + process +
+                              ") is there and has said nothing for "),
+                    HasSubstr("it is stopped by a signal"),
+                    HasSubstr("kill -CONT " + process)));
+  Config config;
+  config.domain_id = std::stoi(domain);
+  const auto before = doctor(config);
+  EXPECT_EQ(before.exit_code, 1);
+  EXPECT_THAT(before.output,
+              AllOf(HasSubstr("! trigpoint_fusion_gate: process " + process +
+                              " runs here with ROS_DOMAIN_ID " + domain +
+                              " and was not found on the bus in 3.0 s"),
+                    HasSubstr("kill -CONT " + process)));
+  gate.signal(SIGCONT);
+  std::this_thread::sleep_for(500ms);
+  const auto goes_on = doctor(config);
+  EXPECT_EQ(goes_on.exit_code, 0) << goes_on.output;
 }
 
 // ---- health checks ------------------------------------------------------------------------------

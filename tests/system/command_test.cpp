@@ -18,6 +18,7 @@ namespace {
 using namespace std::chrono_literals;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using tests::CommandResult;
 using tests::run_command;
 using tests::TemporaryFolder;
@@ -555,6 +556,40 @@ TEST(Command, doctor_tells_when_nobody_is_on_the_bus) {
   EXPECT_THAT(result.output, HasSubstr("nobody writes"));
 }
 
+TEST(Command, a_wrong_domain_is_all_that_is_said) {
+  const TemporaryFolder folder;
+  const std::vector<std::vector<std::string>> commands{
+      {"doctor", "--seconds", "1"},
+      {"doctor", "--gps-filter"},
+      {"doctor", "--alive", "trigpoint_no_such_program"},
+      {"live", "--port", "0"},
+      {"record", "--out", folder.path("bag"), "--duration", "1"},
+      {"play", "short"},
+      {"config", "--check"}};
+  for (std::vector<std::string> command : commands) {
+    command.insert(command.begin(), program());
+    const CommandResult result = run_command(command, 60s, {{"ROS_DOMAIN_ID", "abc"}});
+    EXPECT_EQ(result.exit_code, 2) << command[1];
+    EXPECT_EQ(result.output,
+              "trigpoint: environment variable ROS_DOMAIN_ID is 'abc'; expected a whole number "
+              "from 0 to 232\n");
+  }
+  EXPECT_FALSE(fs::exists(folder.path("bag")));
+}
+
+TEST(Command, config_checks_what_every_process_would_refuse) {
+  const TemporaryFolder folder;
+  const CommandResult right = trigpoint({"config", "--check"});
+  EXPECT_EQ(right.exit_code, 0) << right.output;
+  EXPECT_THAT(right.output,
+              AllOf(HasSubstr("right; joins DDS domain " + tests::own_domain() + " with "),
+                    Not(HasSubstr("robot:"))));
+  tests::write_file(folder.path("c.yaml"), "bus: {initial_peers: [\"x\"]}\n");
+  const CommandResult wrong = trigpoint({"config", "--check", "--config", folder.path("c.yaml")});
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_THAT(wrong.output, HasSubstr("bus.initial_peers has 'x'"));
+}
+
 TEST(Command, a_recording_of_silence_leaves_no_bag) {
   const TemporaryFolder folder;
   const CommandResult result =
@@ -562,54 +597,6 @@ TEST(Command, a_recording_of_silence_leaves_no_bag) {
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.output, HasSubstr("nothing was heard"));
   EXPECT_FALSE(fs::exists(folder.path("bag")));
-}
-
-/// bringup/run's mistakes, all found before a process is started.
-TEST(BringupRun, finds_wrong_usage_before_it_makes_a_session) {
-  const TemporaryFolder folder;
-  const std::string session = folder.path("s");
-  tests::write_file(folder.path("c.yaml"), "bus: {network_interface: nope0}\n");
-  const std::vector<std::vector<std::string>> wrong{{"short", "--rate", "abc"},
-                                                    {"short", "--seed", "1.5"},
-                                                    {"short", "--duration", "abc"},
-                                                    {"short", "--config", folder.path("c.yaml")},
-                                                    {"nosuch"}};
-  for (const auto& each : wrong) {
-    std::vector<std::string> arguments{std::string(TRIGPOINT_SOURCE_DIR) + "/bringup/run"};
-    arguments.insert(arguments.end(), each.begin(), each.end());
-    arguments.insert(arguments.end(), {"--no-build", "--out", session});
-    const CommandResult result = run_command(
-        arguments,
-        60s,
-        {{"ROS_DOMAIN_ID", tests::own_domain(53)}, {"TRIGPOINT_BIN", TRIGPOINT_BIN_DIR}});
-    EXPECT_EQ(result.exit_code, 2) << each.back() << ": " << result.output;
-    EXPECT_FALSE(fs::exists(session)) << each.back();
-  }
-}
-
-TEST(BringupRun, names_a_program_that_is_not_built_before_it_makes_a_session) {
-  const TemporaryFolder folder;
-  for (const char* name : {"trigpoint", "trigpoint_supervise"}) {
-    fs::create_directories(folder.path("bin"));
-    fs::create_symlink(std::string(TRIGPOINT_BIN_DIR) + "/" + name,
-                       folder.path("bin") + "/" + name);
-  }
-  const std::vector<std::pair<std::vector<std::string>, std::string>> scripts{
-      {{"run", "short"}, "trigpoint_lio_mapper"}, {{"host", "robot"}, "trigpoint_clock_watch"}};
-  for (const auto& [arguments, missing] : scripts) {
-    std::vector<std::string> command{std::string(TRIGPOINT_SOURCE_DIR) + "/bringup/" + arguments[0],
-                                     arguments[1],
-                                     "--no-build",
-                                     "--out",
-                                     folder.path("s")};
-    const CommandResult result = run_command(
-        command,
-        60s,
-        {{"ROS_DOMAIN_ID", tests::own_domain(53)}, {"TRIGPOINT_BIN", folder.path("bin")}});
-    EXPECT_EQ(result.exit_code, 1) << result.output;
-    EXPECT_THAT(result.output, HasSubstr(missing + " is not there"));
-    EXPECT_FALSE(fs::exists(folder.path("s")));
-  }
 }
 
 }  // namespace

@@ -49,12 +49,12 @@ std::string seconds_text(double seconds) {
 }  // namespace
 
 int check_alive(const SystemConfig& config, const std::string& program, double patience_s) {
+  const std::string domain = "DDS domain " + std::to_string(bus::domain_of(config.bus));
   const std::set<unsigned> processes = processes_of(program);
   if (processes.empty()) {
     std::cerr << "trigpoint doctor: no " << program << " runs here\n";
     return 1;
   }
-  const std::string domain = "DDS domain " + std::to_string(bus::domain_of(config.bus));
   const auto begin = std::chrono::steady_clock::now();
   if (!recording::is_heard(config.bus, processes, patience_s)) {
     std::cerr << "trigpoint doctor: " << program << " (process " << list_of(processes)

@@ -2,6 +2,7 @@
 // Copyright the Trigpoint developers
 #include "bus_guard.hpp"
 
+#include "bus_trial.hpp"
 #include "known_topics.hpp"
 #include "program_name.hpp"
 
@@ -30,21 +31,27 @@ std::vector<recording::KnownTopic> guarded_topics(const RobotConfig& robot, Guar
   return guards;
 }
 
-std::vector<recording::TopicSurvey> listen(const SystemConfig& config, Guarded guarded) {
+/// What the bus says of a key of the configuration is a mistake of the user's.
+template <typename Work>
+auto blaming_the_configuration(Work work) {
   try {
-    recording::SurveyOptions survey;
-    survey.bus = config.bus;
-    survey.topics = guarded_topics(config.cores.robot, guarded);
-    survey.duration_s = kListen_s;
-    return recording::survey_bus(survey);
+    return work();
   } catch (const ConfigError&) {
     throw;
   } catch (const std::runtime_error& error) {
     if (std::string(error.what()).starts_with("bus.")) {
-      throw ConfigError(error.what());  // names a key of the configuration
+      throw ConfigError(error.what());
     }
     throw;
   }
+}
+
+std::vector<recording::TopicSurvey> listen(const SystemConfig& config, Guarded guarded) {
+  recording::SurveyOptions survey;
+  survey.bus = config.bus;
+  survey.topics = guarded_topics(config.cores.robot, guarded);
+  survey.duration_s = kListen_s;
+  return blaming_the_configuration([&] { return recording::survey_bus(survey); });
 }
 
 }  // namespace
@@ -71,6 +78,10 @@ BusFindings look_for_writers(const SystemConfig& config, Guarded guarded) {
     }
   }
   return findings;
+}
+
+std::string try_to_join(const SystemConfig& config) {
+  return blaming_the_configuration([&] { return recording::try_to_join(config.bus); });
 }
 
 std::string refusal(const BusFindings& findings, const SystemConfig& config) {

@@ -25,6 +25,10 @@ struct BusFindings {
 /// std::runtime_error when the bus cannot be joined.
 BusFindings look_for_writers(const SystemConfig& config, Guarded guarded);
 
+/// Joins the bus and leaves it; says which: "DDS domain 3 with fastdds". Throws as
+/// look_for_writers.
+std::string try_to_join(const SystemConfig& config);
+
 /// "gps/odometry: trigpoint_gps_ekf15 (process 123)\n..." with the remedy; for an error.
 std::string refusal(const BusFindings& findings, const SystemConfig& config);
 

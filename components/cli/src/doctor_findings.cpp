@@ -39,13 +39,8 @@ std::string ros_type_of(const std::string& dds_type) {
   return dds_type.substr(0, at) + "/msg/" + dds_type.substr(name, dds_type.size() - name - 1);
 }
 
-/// A number tells a process on this computer only, and another's may have the same: so only a
-/// program of ours is named.
 std::string owner_of(const DiscoveredEndpoint& endpoint) {
-  const std::string program = endpoint.process ? program_of(*endpoint.process) : "";
-  return program.starts_with("trigpoint")
-             ? program + " (process " + std::to_string(*endpoint.process) + ")"
-             : "participant " + endpoint.guid.substr(0, 24);
+  return owner_text(endpoint.process, endpoint.guid);
 }
 
 std::string vendor_of(const std::string& guid) {

@@ -112,11 +112,6 @@ SystemConfig configure(const InputOptions& options, const Known& known) {
   return config;
 }
 
-/// Throws ConfigError when a core refuses its configuration as a whole.
-void check_cores(const SystemConfig& config) {
-  const pipeline::Lockstep cores(config.cores);
-}
-
 /// Whether the user named a topic that the log does not have as this type, whatever else is wrong
 /// with it.
 bool names_a_wrong_topic(const std::string& log, const SystemConfig& config) {
@@ -319,6 +314,10 @@ Input open_input(const InputOptions& given) {
   Input input = open_recording(options);
   check_cores(input.config);
   return input;
+}
+
+void check_cores(const SystemConfig& config) {
+  const pipeline::Lockstep cores(config.cores);
 }
 
 SystemConfig load_config_of(const InputOptions& options) {

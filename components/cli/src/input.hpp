@@ -70,6 +70,9 @@ Input open_input(const InputOptions& options);
 /// any more; of a recorded drive nothing.
 void leave_truth(const Input& input, const std::string& session);
 
+/// Throws ConfigError when a core refuses its configuration as a whole.
+void check_cores(const SystemConfig& config);
+
 /// The configuration alone, without a log.
 SystemConfig load_config_of(const InputOptions& options);
 

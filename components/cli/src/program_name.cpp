@@ -14,4 +14,10 @@ std::string program_of(unsigned number) {
   return std::filesystem::path(program).filename().string();
 }
 
+std::string owner_text(std::optional<unsigned> process, const std::string& guid) {
+  const std::string program = process ? program_of(*process) : "";
+  return program.starts_with("trigpoint") ? program + " (process " + std::to_string(*process) + ")"
+                                          : "participant " + guid.substr(0, 24);
+}
+
 }  // namespace trigpoint::cli

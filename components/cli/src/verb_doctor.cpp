@@ -11,6 +11,7 @@
 #include "measurement_checks.hpp"
 #include "number_checks.hpp"
 #include "progress.hpp"
+#include "silent_programs.hpp"
 #include "verbs.hpp"
 
 #include <algorithm>
@@ -72,8 +73,8 @@ int tell_incomplete_datagrams(std::optional<std::int64_t> failed_before) {
 int examine_bus(const DoctorOptions& options) {
   const shell::EventLog log("doctor");
   const SystemConfig config = load_config_of(options.input);
-  std::cout << "DDS domain " << bus::domain_of(config.bus) << ", listening for " << options.seconds
-            << " s\n";
+  const int domain = bus::domain_of(config.bus);  // throws: before half a line is printed
+  std::cout << "DDS domain " << domain << ", listening for " << options.seconds << " s\n";
   std::vector<bus::DiscoveredEndpoint> endpoints;
   const auto failed_before = failed_reassemblies();
   const auto surveys = recording::survey_bus(
@@ -97,8 +98,16 @@ int examine_bus(const DoctorOptions& options) {
       wrong |= tell(survey.topic.name, {refused_advice(policy)});
     }
   }
-  for (const Finding& finding : findings_of(surveys, endpoints, config.cores.robot)) {
-    wrong |= tell(finding.topic, {finding.sentence});
+  const std::vector<LocalProcess> local = local_processes();
+  const RobotConfig& robot = config.cores.robot;
+  for (const std::vector<Finding>& findings :
+       {findings_of(surveys, endpoints, robot),
+        silent_on_the_bus(surveys, local, robot),
+        not_on_the_bus(surveys, local, domain, options.seconds),
+        mapper_without_track(surveys, robot)}) {
+    for (const Finding& finding : findings) {
+      wrong |= tell(finding.topic, {finding.sentence});
+    }
   }
   std::cout << (endpoints.empty() ? "on the bus: nobody else\n" : "on the bus:\n");
   for (const std::string& line : who_is_there(endpoints)) {
@@ -207,8 +216,9 @@ int examine_log(const DoctorOptions& options) {
 
 void add_doctor(CLI::App& app, Chosen& chosen) {
   CLI::App* verb = app.add_subcommand("doctor",
-                                      "Tell what is on the bus (or in LOG), what is missing, and "
-                                      "which unit, frame or QoS is wrong");
+                                      "Tell what is on the bus (or in LOG), what is missing, which "
+                                      "program is silent or has no track, and which unit, frame "
+                                      "or QoS is wrong");
   const auto options = std::make_shared<DoctorOptions>();
   verb->add_option("LOG", options->input.log, "examine this log instead of the bus");
   add_config_options(*verb, options->input);

@@ -9,10 +9,12 @@
 #include "input.hpp"
 #include "interruption.hpp"
 #include "progress.hpp"
+#include "shell_word.hpp"
 #include "told_once.hpp"
 #include "verbs.hpp"
 
 #include <algorithm>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -106,48 +108,108 @@ int exit_code_of(const pipeline::MapLogResult& result) {
   return 0;
 }
 
-/// `refused_imu` becomes the sentence of an IMU that was refused for good while it ran;
-/// `not_resumed` tells that the robot was not found in the stored map.
-pipeline::MapLogResult map(const MapOptions& options, std::string& refused_imu, bool& not_resumed) {
+/// Where a drive goes that was not found in the map of `session`: beside it, never over another.
+std::string folder_apart_from(const std::string& session) {
+  const std::string apart = std::filesystem::canonical(session).string() + ".not_resumed";
+  std::string folder = apart;
+  for (int n = 2; std::filesystem::exists(folder); ++n) {
+    folder = apart + "-" + std::to_string(n);
+  }
+  return folder;
+}
+
+struct MapOutcome {
+  pipeline::MapLogResult result;
+  std::string refused_imu;     ///< the sentence of an IMU that was refused for good while it ran
+  bool not_localized{false};   ///< the robot was not found in the map of --localize
+  std::string kept_as_it_was;  ///< the session of --resume in whose map it was not found
+  std::string why_not_resumed;
+  bool stopped_in_trial{false};  ///< by the user; nothing is written
+};
+
+/// Nothing is written into the session before its place in the map is known. A drive that does not
+/// find it becomes a session of its own, about the same datum.
+void try_to_resume(MapOptions& options,
+                   const SystemConfig& config,
+                   const std::function<bool()>& stop,
+                   std::optional<pipeline::StoredSession>& stored,
+                   MapOutcome& outcome) {
+  const Input input = open_input(options.input);
+  std::cerr << "looking for the place in the map of " << options.resume << "\n";
+  const pipeline::PlaceTrial trial =
+      pipeline::try_place(*input.reader, config.cores, *stored, stop);
+  outcome.stopped_in_trial = trial.verdict == pipeline::PlaceTrial::Verdict::kStopped;
+  if (trial.verdict == pipeline::PlaceTrial::Verdict::kNotFound) {
+    outcome.why_not_resumed = trial.why_not;
+    outcome.kept_as_it_was = std::exchange(options.resume, {});
+    options.out = folder_apart_from(outcome.kept_as_it_was);
+    stored.reset();
+  }
+}
+
+MapOutcome map(MapOptions& options) {
   const shell::StopSignal stop;
   const shell::EventLog log("map");
+  MapOutcome outcome;
   ToldOnce events([&](const Event& event) {
     log(event);
     if (event.code == "imu_gyro_in_degrees") {
-      refused_imu = event.text;
+      outcome.refused_imu = event.text;
     }
-    not_resumed = not_resumed || event.code == "lio_not_resumed";
+    if (event.code == "lio_not_resumed") {
+      outcome.not_localized = !options.localize.empty();
+    }
   });
+  const auto stop_is_wanted = [&] { return stop.requested(); };
   std::optional<pipeline::StoredSession> stored = stored_of(options);
   Input input = open_input(options.input);
   if (stored) {
     keep_datum(stored->datum, input.config.cores.gps_odometry);
     refuse_older_log(options, *stored, input.reader->summary());
   }
+  if (!options.resume.empty()) {
+    try_to_resume(options, input.config, stop_is_wanted, stored, outcome);
+    if (outcome.stopped_in_trial) {
+      return outcome;
+    }
+  }
   leave_truth(input, options.out);
-  pipeline::MapLogResult result;
   {
     Progress progress("mapping");
-    result = pipeline::map_log(*input.reader,
-                               input.config.cores,
-                               {options.out,
-                                print(input.config),
-                                mode_of(input.config),
-                                [&](double share) { progress(share); },
-                                [&](const Event& event) { events(event); },
-                                [&] { return stop.requested(); },
-                                use_of(options),
-                                std::move(stored)});
+    outcome.result = pipeline::map_log(*input.reader,
+                                       input.config.cores,
+                                       {options.out,
+                                        print(input.config),
+                                        mode_of(input.config),
+                                        [&](double share) { progress(share); },
+                                        [&](const Event& event) { events(event); },
+                                        stop_is_wanted,
+                                        use_of(options),
+                                        std::move(stored)});
   }
   std::cerr << events.summary();
-  return result;
+  return outcome;
+}
+
+void tell_not_resumed(const MapOutcome& outcome, const std::string& out) {
+  std::cerr << "trigpoint map: the robot was not found in the stored map ("
+            << outcome.why_not_resumed << "). " << outcome.kept_as_it_was
+            << " is as it was; the new drive is a session of its own, about the same datum: " << out
+            << ". One map of both, by GPS and where they meet: trigpoint merge "
+            << as_shell_word(outcome.kept_as_it_was) << " " << as_shell_word(out)
+            << " --out DIR. Or try --resume again, with a log that begins near the stored "
+               "session's last or first place\n";
 }
 
 int run(MapOptions& options) {
   check(options);
-  std::string refused_imu;
-  bool not_resumed = false;
-  const pipeline::MapLogResult result = map(options, refused_imu, not_resumed);
+  const MapOutcome outcome = map(options);
+  const pipeline::MapLogResult& result = outcome.result;
+  if (outcome.stopped_in_trial) {
+    std::cerr << "trigpoint map: interrupted before the place in the stored map was found; "
+              << options.resume << " is as it was\n";
+    return kInterrupted;
+  }
   if (result.stopped) {
     std::cerr << "trigpoint map: interrupted after " << result.data_s
               << " s of the log; what was done so far is kept in " << options.out
@@ -161,17 +223,23 @@ int run(MapOptions& options) {
   std::cout << result.sweeps_used << " of " << result.sweeps_in_log << " sweeps used, "
             << result.data_s << " s of data in " << result.wall_s << " s ("
             << result.data_s / std::max(result.wall_s, 1e-9) << " x real time)\n";
-  if (!refused_imu.empty()) {
-    std::cerr << "trigpoint map: " << refused_imu << (refused_imu.ends_with('.') ? " " : ". ")
+  const bool not_resumed = !outcome.kept_as_it_was.empty();
+  if (not_resumed) {
+    tell_not_resumed(outcome, options.out);
+  }
+  if (!outcome.refused_imu.empty()) {
+    std::cerr << "trigpoint map: " << outcome.refused_imu
+              << (outcome.refused_imu.ends_with('.') ? " " : ". ")
               << "What came before is of no use either\n";
     return 1;
   }
-  if (not_resumed) {
-    std::cerr << "trigpoint map: the robot was not found in the stored map; what came out is a map "
-                 "of its own, in a new odom epoch\n";
+  if (outcome.not_localized) {
+    std::cerr << "trigpoint map: the robot was not found in the map of " << options.localize
+              << ", which is as it was; what came out in " << options.out
+              << " is a map of its own, in a new odom epoch\n";
     return 1;
   }
-  return std::max(exit_code_of(result), finished);
+  return std::max({exit_code_of(result), finished, not_resumed ? 1 : 0});
 }
 
 }  // namespace
@@ -193,7 +261,9 @@ void add_map(CLI::App& app, Chosen& chosen) {
           "--resume",
           options->resume,
           "a stored session that goes on with this log, near its last or first place: same "
-          "odom, map and datum, keyframes and trajectories appended; instead of --out")
+          "odom, map and datum, keyframes and trajectories appended; instead of --out. A drive "
+          "that does not find its place in the map leaves the session as it is and becomes "
+          "one of its own beside it, SESSION.not_resumed, and the exit code is 1")
       ->check(CLI::ExistingDirectory);
   verb->callback([options, &chosen] { chosen = [options] { return run(*options); }; });
 }

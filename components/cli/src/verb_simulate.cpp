@@ -8,6 +8,7 @@
 #include "interruption.hpp"
 #include "number_checks.hpp"
 #include "progress.hpp"
+#include "shell_word.hpp"
 #include "verbs.hpp"
 
 #include <filesystem>
@@ -56,20 +57,6 @@ void simulate(const SimulateOptions& options,
     std::filesystem::remove(options.out, not_empty);  // leaves whatever is in it
     throw;
   }
-}
-
-/// For a command that is to be copied into a shell.
-std::string as_shell_word(const std::string& text) {
-  constexpr const char* kPlain =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-+=./:,@%";
-  if (text.find_first_not_of(kPlain) == std::string::npos) {
-    return text;
-  }
-  std::string word = "'";
-  for (const char c : text) {
-    word += c == '\'' ? "'\\''" : std::string(1, c);
-  }
-  return word + "'";
 }
 
 int run(const SimulateOptions& options) {

@@ -39,6 +39,12 @@ std::string uri_of_unchanging(const std::string& file) {
   return uri + "?immutable=1";
 }
 
+bool has_log(const std::string& file) {
+  const std::string log = file + "-wal";
+  std::error_code none;
+  return fs::exists(log, none) && fs::file_size(log, none) > 0;
+}
+
 /// Also on a disk that is read-only, or of another user.
 Database opened(const std::string& file) {
   if (!fs::exists(file)) {
@@ -47,8 +53,7 @@ Database opened(const std::string& file) {
   if (may_write(file) && may_write(fs::absolute(file).parent_path())) {
     return {file, SQLITE_OPEN_READWRITE};
   }
-  const std::string log = file + "-wal";
-  if (fs::exists(log) && fs::file_size(log) > 0) {
+  if (has_log(file)) {
     return {file, SQLITE_OPEN_READONLY};  // somebody writes, or was killed while writing
   }
   return {file, SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, uri_of_unchanging(file)};
@@ -64,6 +69,9 @@ PointCloud raw_points(const Statement& row, int column) {
 
 struct KeyframeReader::Impl {
   explicit Impl(const std::string& file) : database(opened(file)) {
+    if (has_log(file)) {
+      database.leave_log();  // who reads changes nothing
+    }
     version = store::version_of(database);
     if (version < store::kRawPointsVersion || version > store::kFormatVersion) {
       database.fail("has format version " + std::to_string(version) + ", this program reads " +

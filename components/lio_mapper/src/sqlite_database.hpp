@@ -38,6 +38,10 @@ class Database {
     }
   }
 
+  /// What a killed writer left in the write-ahead log stays there when this is closed, instead of
+  /// being moved into the file.
+  void leave_log() { sqlite3_db_config(handle_, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr); }
+
   [[noreturn]] void fail() const {
     throw std::runtime_error(file_ + ": keyframe store: " + sqlite3_errmsg(handle_));
   }

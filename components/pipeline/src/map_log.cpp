@@ -34,6 +34,36 @@ void tell(const Events& events, const std::function<void(const Event&)>& on_even
   }
 }
 
+/// The robot is looked for near the session's last and first place.
+void go_on_from(const StoredSession& stored, UseOfStored use, Lockstep& cores) {
+  lio_mapper::ResumeOptions options;
+  options.frozen_map = use == UseOfStored::kLocalize;
+  if (stored.first_pose) {
+    options.more_places_odom.push_back(*stored.first_pose);
+  }
+  cores.resume(stored.checkpoint, stored.points, options);
+}
+
+/// "odom epoch 2 begins: WHY"; no epoch begins in a trial.
+std::string why_of(const Event& not_resumed) {
+  const std::string colon = ": ";
+  const std::size_t at = not_resumed.text.find(colon);
+  return at == std::string::npos ? not_resumed.text : not_resumed.text.substr(at + colon.size());
+}
+
+/// What a step says of the place in the stored map; nothing while the search goes on.
+std::optional<PlaceTrial> verdict_of(const Step& step) {
+  for (const Event& event : step.events) {
+    if (event.code == "lio_resumed") {
+      return PlaceTrial{PlaceTrial::Verdict::kFound, ""};
+    }
+    if (event.code == "lio_not_resumed") {
+      return PlaceTrial{PlaceTrial::Verdict::kNotFound, why_of(event)};
+    }
+  }
+  return std::nullopt;
+}
+
 /// The cores on a log, and the session that they leave. For one thread at a time.
 class MapRun {
  public:
@@ -86,12 +116,7 @@ class MapRun {
     if (!options_.stored || options_.use == UseOfStored::kNothing) {
       return;
     }
-    lio_mapper::ResumeOptions resume;
-    resume.frozen_map = options_.use == UseOfStored::kLocalize;
-    if (options_.stored->first_pose) {
-      resume.more_places_odom.push_back(*options_.stored->first_pose);
-    }
-    cores_.resume(options_.stored->checkpoint, options_.stored->points, resume);
+    go_on_from(*options_.stored, options_.use, cores_);
   }
 
   template <typename Advance>
@@ -171,6 +196,29 @@ struct RunBeside {
 };
 
 }  // namespace
+
+PlaceTrial try_place(recording::LogReader& log,
+                     const CoreConfigs& configs,
+                     const StoredSession& stored,
+                     const std::function<bool()>& stop) {
+  Lockstep cores(configs);
+  go_on_from(stored, UseOfStored::kResume, cores);
+  try {
+    while (const auto entry = log.next()) {
+      if (stop && stop()) {
+        return {PlaceTrial::Verdict::kStopped, ""};
+      }
+      if (auto verdict = verdict_of(cores.step(*entry))) {
+        return *verdict;
+      }
+    }
+  } catch (const recording::LogError& broken) {
+    return {PlaceTrial::Verdict::kNotFound, std::string("the log breaks off: ") + broken.what()};
+  }
+  return verdict_of(cores.finish())
+      .value_or(PlaceTrial{PlaceTrial::Verdict::kNotFound,
+                           "the log ended before the search for the place did"});
+}
 
 MapLogResult map_log(recording::LogReader& log,
                      const CoreConfigs& configs,

@@ -16,6 +16,12 @@ namespace trigpoint::recording {
 
 namespace {
 
+using Clock = std::chrono::steady_clock;
+
+double seconds_between(Clock::time_point from, Clock::time_point to) {
+  return std::chrono::duration<double>(to - from).count();
+}
+
 /// One subscription and what it has heard; changed on the loop's thread only.
 class Listener {
  public:
@@ -33,10 +39,12 @@ class Listener {
                             },
                             bus::WhenFull::kDropOldest);
                       },
-                      {[this, &loop](const std::string& writer) {
-                         loop.post([this, writer] { matched_.insert(writer); });
+                      {[this, &loop, &participant](const std::string& writer) {
+                         loop.post([this, &participant, writer] { find(writer, participant); });
                        },
-                       {},
+                       [this, &loop](const std::string& writer) {
+                         loop.post([this, writer] { lose(writer); });
+                       },
                        [this, &loop](const std::string& policy) {
                          loop.post([this, policy] { survey_.refused.insert(policy); });
                        }}) {
@@ -44,24 +52,56 @@ class Listener {
   }
 
   TopicSurvey result(bus::Participant& participant, double duration_s) {
+    const Clock::time_point now = Clock::now();
     survey_.rate_hz = static_cast<double>(survey_.messages) / duration_s;
-    for (const std::string& writer : matched_) {
+    for (const auto& [writer, newest] : newest_) {
+      survey_.silent_s[writer] = seconds_between(newest, now);
       if (!survey_.writers.contains(writer)) {
         survey_.silent_writers.insert(writer);
       }
-      if (const auto process = participant.process_of(writer)) {
-        survey_.processes[writer] = *process;
-      }
+      keep_process(writer, participant);
+    }
+    if (without_track_since_) {
+      survey_.without_track_s = seconds_between(*without_track_since_, now);
     }
     survey_.remarks = checks_.remarks();
     return survey_;
   }
 
  private:
+  void find(const std::string& writer, bus::Participant& participant) {
+    const Clock::time_point now = Clock::now();
+    newest_.emplace(writer, now);
+    if (!found_) {
+      found_ = now;
+    }
+    survey_.silent_before_leaving_s.erase(writer);  // back again
+    keep_process(writer, participant);              // nobody tells once it has left
+  }
+
+  void lose(const std::string& writer) {
+    if (const auto newest = newest_.find(writer); newest != newest_.end()) {
+      survey_.silent_before_leaving_s[writer] = seconds_between(newest->second, Clock::now());
+    }
+  }
+
+  void keep_process(const std::string& writer, bus::Participant& participant) {
+    if (const auto process = participant.process_of(writer)) {
+      survey_.processes[writer] = *process;
+    }
+  }
+
   void take(const bus::SerializedMessage& bytes, const std::string& writer) {
     ++survey_.messages;
     survey_.bytes += bytes.size();
     survey_.writers.insert(writer);
+    newest_[writer] = Clock::now();
+    LioStatus status;
+    if (survey_.topic.ros_type == bus::ros_type_name<LioStatus>() &&
+        bus::decode_cdr(bytes, status)) {
+      remember(status);
+      return;
+    }
     check<ImuSample>(bytes) || check<GnssFix>(bytes) || check<PointCloudMessage>(bytes) ||
         check<Odometry>(bytes);
   }
@@ -97,11 +137,23 @@ class Listener {
     }
   }
 
+  void remember(const LioStatus& status) {
+    const bool has_track = status.health == LioHealth::kOk || status.health == LioHealth::kDegraded;
+    if (has_track) {
+      without_track_since_.reset();
+    } else if (!without_track_since_) {  // nor had it one when it was found, as far as it told
+      without_track_since_ = survey_.last_lio_status ? Clock::now() : found_.value_or(Clock::now());
+    }
+    survey_.last_lio_status = status;
+  }
+
   template <typename Plain>
   void remember(const Plain&) {}
 
   TopicSurvey survey_;
-  std::set<std::string> matched_;
+  std::map<std::string, Clock::time_point> newest_;  ///< message by writer, or when it was found
+  std::optional<Clock::time_point> found_;           ///< the first writer
+  std::optional<Clock::time_point> without_track_since_;
   MeasurementChecks checks_;
   bus::SerializedSubscription subscription_;
 };

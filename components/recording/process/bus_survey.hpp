@@ -5,6 +5,7 @@
 
 #include "trigpoint/base/event.hpp"
 #include "trigpoint/base/measurements.hpp"
+#include "trigpoint/base/messages.hpp"
 #include "trigpoint/bus/config.hpp"
 #include "trigpoint/bus/discovered.hpp"
 
@@ -31,6 +32,14 @@ struct TopicSurvey {
   std::set<std::string> refused;              ///< QoS policies for which a writer did not match
   std::vector<std::string> remarks;           ///< wrong units, missing fields, frames: sentences
   std::optional<GnssFix> last_fix;            ///< or datum
+  /// By writer, also those who have left: until the end of the survey, since the newest message or,
+  /// where none came, since it was found.
+  std::map<std::string, double> silent_s;
+  /// Of them those who have left: how long they had been silent by then. One that ends says so; of
+  /// one that is stopped, hangs as a whole or lost its network only the bus's lease runs out.
+  std::map<std::string, double> silent_before_leaving_s;
+  std::optional<LioStatus> last_lio_status;
+  double without_track_s{0.0};  ///< for so long, up to the end, lio/status has told of no track
 };
 
 struct SurveyOptions {

@@ -31,9 +31,10 @@ Durability durability_of(const bus::Qos& qos) {
 
 RecordResult record(const RecordOptions& options) {
   bus::Loop loop;
+  // First: who cannot join the bus leaves no bag.
+  bus::Participant participant(options.bus, "recorder", options.on_event);
   Rosbag2Writer writer(options.out, options.storage);
   std::map<std::string, TopicSummary> counts;
-  bus::Participant participant(options.bus, "recorder", options.on_event);
   std::vector<std::unique_ptr<bus::SerializedSubscription>> subscriptions;
   for (const KnownTopic& topic : options.topics) {
     subscriptions.push_back(std::make_unique<bus::SerializedSubscription>(

@@ -15,6 +15,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <stdexcept>
 #include <vector>
 
@@ -426,6 +427,30 @@ TEST_F(KeyframeStore, is_read_where_nobody_may_write) {
   ASSERT_EQ(read.size(), 1U);
   expect_equal(read.front(), keyframe(1));
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(odd), {}), 1) << "nothing is left";
+}
+
+std::string bytes_of(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// What a killed writer had in its log is read, and stays there.
+TEST_F(KeyframeStore, is_not_changed_by_a_reader_after_its_writer_was_killed) {
+  const std::filesystem::path left = folder_ / "left";
+  std::filesystem::create_directory(left);
+  {
+    KeyframeWriter writer(file());
+    writer.append(keyframe(1));
+    for (const char* name : {"keyframes.sqlite", "keyframes.sqlite-wal"}) {  // as a kill leaves it
+      std::filesystem::copy_file(folder_ / name, left / name);
+    }
+  }
+  const std::string store = bytes_of(left / "keyframes.sqlite");
+  const std::string log = bytes_of(left / "keyframes.sqlite-wal");
+  ASSERT_FALSE(log.empty());
+  EXPECT_EQ(KeyframeReader(left / "keyframes.sqlite").visit([](const Keyframe&) {}), 1U);
+  EXPECT_TRUE(store == bytes_of(left / "keyframes.sqlite"));
+  EXPECT_TRUE(log == bytes_of(left / "keyframes.sqlite-wal"));
 }
 
 }  // namespace

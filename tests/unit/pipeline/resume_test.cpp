@@ -204,6 +204,49 @@ TEST(MapLogResume, appends_to_the_session_and_goes_on_counting) {
   EXPECT_GT(exporter::read_trajectory(folder.file("lio.tum")).size(), poses + 15);
 }
 
+PlaceTrial try_later_entries(const StoredSession& stored, double to_s = 7.0) {
+  const Entries entries = entries_between(4.5, to_s);
+  StoredLog log(entries);
+  CoreConfigs configs = stored_drive().configs;
+  configs.lio_mapper.recovery.attempts = 1;
+  return try_place(log, configs, stored);
+}
+
+TEST(PlaceTrial, finds_what_a_resumed_session_finds_and_writes_nothing) {
+  const ScratchFolder folder;
+  map_into(folder.path(), entries_between(0.0, 4.0));
+  const std::string before = test::read_all(folder.file("keyframes.sqlite"));
+  EXPECT_EQ(try_later_entries(open_stored_session(folder.path())).verdict,
+            PlaceTrial::Verdict::kFound);
+  EXPECT_TRUE(before == test::read_all(folder.file("keyframes.sqlite")));
+}
+
+TEST(PlaceTrial, says_why_the_place_was_not_found) {
+  const ScratchFolder folder;
+  map_into(folder.path(), entries_between(0.0, 4.0));
+  StoredSession elsewhere = open_stored_session(folder.path());
+  elsewhere.first_pose.reset();
+  elsewhere.checkpoint.T_odom_base.p.x() += 40.0;  // four times what is searched
+  const PlaceTrial trial = try_later_entries(elsewhere);
+  EXPECT_EQ(trial.verdict, PlaceTrial::Verdict::kNotFound);
+  EXPECT_FALSE(trial.why_not.empty());
+  EXPECT_EQ(trial.why_not.find("epoch"), std::string::npos) << trial.why_not;
+  const PlaceTrial too_short = try_later_entries(open_stored_session(folder.path()), 4.6);
+  EXPECT_EQ(too_short.verdict, PlaceTrial::Verdict::kNotFound);
+  EXPECT_EQ(too_short.why_not, "the log ended before the search for the place did");
+}
+
+TEST(PlaceTrial, ends_when_it_is_asked_to) {
+  const ScratchFolder folder;
+  map_into(folder.path(), entries_between(0.0, 4.0));
+  StoredLog log(stored_drive().entries);
+  EXPECT_EQ(
+      try_place(
+          log, stored_drive().configs, open_stored_session(folder.path()), [] { return true; })
+          .verdict,
+      PlaceTrial::Verdict::kStopped);
+}
+
 TEST(MapLogLocalize, leaves_the_stored_session_as_it_is) {
   const ScratchFolder stored;
   const ScratchFolder result;

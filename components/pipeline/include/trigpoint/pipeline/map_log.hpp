@@ -45,6 +45,22 @@ struct MapLogResult {
   std::string log_error;  ///< not empty when the log broke off; what came before was used
 };
 
+/// Whether a log's robot is found in a stored map.
+struct PlaceTrial {
+  enum class Verdict { kFound, kNotFound, kStopped };
+  Verdict verdict{Verdict::kNotFound};
+  std::string why_not;  ///< of kNotFound
+};
+
+/// Feeds the cores a log until the mapper has found its place in `stored`, or given that up, and
+/// writes nothing: a map_log with kResume over the same log comes to the same verdict, with the
+/// same bits, and goes on. The log is read as far as that takes. `stop` as in MapLogOptions. Throws
+/// ConfigError when a core refuses its configuration, and what `stored` throws when it is read.
+PlaceTrial try_place(recording::LogReader& log,
+                     const CoreConfigs& configs,
+                     const StoredSession& stored,
+                     const std::function<bool()>& stop = {});
+
 /// Runs the three cores in lock-step over a log and leaves a session folder without map and report
 /// (exporter::render_map and evaluation make those from it). Throws std::runtime_error naming file
 /// and cause when the session cannot be written, ConfigError when a core refuses its configuration.

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+// bringup/run and bringup/host at their door: mistakes are found before a process is started and a
+// session is made.
+#include "run_command.hpp"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace trigpoint {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using tests::CommandResult;
+using tests::run_command;
+using tests::TemporaryFolder;
+namespace fs = std::filesystem;
+
+std::string script(const std::string& name) {
+  return std::string(TRIGPOINT_SOURCE_DIR) + "/bringup/" + name;
+}
+
+struct Mistake {
+  std::vector<std::string> arguments;
+  std::string said;
+  std::string domain{tests::own_domain(53)};
+};
+
+void expect_refused(const std::string& name, const std::vector<Mistake>& mistakes) {
+  const TemporaryFolder folder;
+  const std::string session = folder.path("s");
+  for (const Mistake& mistake : mistakes) {
+    std::vector<std::string> arguments{script(name)};
+    arguments.insert(arguments.end(), mistake.arguments.begin(), mistake.arguments.end());
+    arguments.insert(arguments.end(), {"--no-build", "--out", session});
+    const CommandResult result = run_command(
+        arguments, 60s, {{"ROS_DOMAIN_ID", mistake.domain}, {"TRIGPOINT_BIN", TRIGPOINT_BIN_DIR}});
+    EXPECT_EQ(result.exit_code, 2) << mistake.said << ": " << result.output;
+    EXPECT_THAT(result.output, HasSubstr(mistake.said));
+    EXPECT_FALSE(fs::exists(session)) << mistake.said;
+    fs::remove_all(session);
+  }
+}
+
+TEST(Bringup, run_finds_wrong_usage_before_it_makes_a_session) {
+  const TemporaryFolder folder;
+  const std::string no_interface = folder.path("c.yaml");
+  tests::write_file(no_interface, "bus: {network_interface: nope0}\n");
+  expect_refused("run",
+                 {{{"short", "--rate", "abc"}, "--rate must be 'max' or a number above 0"},
+                  {{"short", "--rate", "nan"}, "--rate must be"},
+                  {{"short", "--rate", "--seed", "1"}, "--rate needs a value"},
+                  {{"short", "--seed", "1.5"}, "must be a whole number"},
+                  {{"short", "--duration", "abc"}, "must be a number above 0"},
+                  {{"short", "--config", no_interface}, "network_interface is 'nope0'"},
+                  {{"short", "--config", folder.path()}, "is a folder; a YAML file is expected"},
+                  {{"short", "--config", "/no/such.yaml"}, "no such file: /no/such.yaml"},
+                  {{""}, "LOG is empty"},
+                  {{"nosuch"}, "nosuch: no such file or folder, nor a scenario"},
+                  {{"short"}, "environment variable ROS_DOMAIN_ID is 'abc'; expected", "abc"}});
+}
+
+TEST(Bringup, host_finds_wrong_usage_before_it_makes_a_session) {
+  const TemporaryFolder folder;
+  const std::string no_interface = folder.path("c.yaml");
+  tests::write_file(no_interface, "bus: {network_interface: nope0}\n");
+  expect_refused("host",
+                 {{{"base", "--play", "short", "--rate", "abc"}, "--rate must be 'max' or"},
+                  {{"base", "--play", "short", "--rate", "-1"}, "--rate must be 'max' or"},
+                  {{"base", "--play", "short", "--rate", "--for"}, "--rate needs a value"},
+                  {{"base", "--rate", "2"}, "--rate is that of --play LOG, which is not there"},
+                  {{"base", "--play", "nosuch"}, "nosuch: no such file or folder"},
+                  {{"base", "--config", no_interface}, "network_interface is 'nope0'"},
+                  {{"base", "--config", folder.path()}, "is a folder; a YAML file is expected"},
+                  {{"base", "--peers", "10.0.0.1,x"}, "bus.initial_peers has 'x'"},
+                  {{"base", "--vendor", "foo"}, "'foo' is neither fastdds nor cyclonedds"},
+                  {{"base", "--name", "a/b"}, "'a/b' becomes part of file names"},
+                  {{"mapper,mapper"}, "'mapper' is twice in the list"},
+                  {{"robots"}, "'robots' is neither robot, base"},
+                  {{"base"}, "environment variable ROS_DOMAIN_ID is 'abc'; expected", "abc"}});
+}
+
+TEST(Bringup, names_a_program_that_is_not_built_before_it_makes_a_session) {
+  const TemporaryFolder folder;
+  for (const char* name : {"trigpoint", "trigpoint_supervise"}) {
+    fs::create_directories(folder.path("bin"));
+    fs::create_symlink(std::string(TRIGPOINT_BIN_DIR) + "/" + name,
+                       folder.path("bin") + "/" + name);
+  }
+  const std::vector<std::pair<std::vector<std::string>, std::string>> scripts{
+      {{"run", "short"}, "trigpoint_lio_mapper"}, {{"host", "robot"}, "trigpoint_clock_watch"}};
+  for (const auto& [arguments, missing] : scripts) {
+    std::vector<std::string> command{std::string(TRIGPOINT_SOURCE_DIR) + "/bringup/" + arguments[0],
+                                     arguments[1],
+                                     "--no-build",
+                                     "--out",
+                                     folder.path("s")};
+    const CommandResult result = run_command(
+        command,
+        60s,
+        {{"ROS_DOMAIN_ID", tests::own_domain(53)}, {"TRIGPOINT_BIN", folder.path("bin")}});
+    EXPECT_EQ(result.exit_code, 1) << result.output;
+    EXPECT_THAT(
+        result.output,
+        AllOf(HasSubstr(missing + " is not there"), HasSubstr("bringup/build trigpoint_job")));
+    EXPECT_FALSE(fs::exists(folder.path("s")));
+  }
+}
+
+/// So that who has built for one can run the other with --no-build.
+TEST(Bringup, run_and_host_build_the_same) {
+  const TemporaryFolder folder;
+  fs::create_directories(folder.path("bringup"));
+  for (const char* name : {"run", "host"}) {
+    fs::copy_file(script(name), folder.path("bringup") + "/" + name);
+  }
+  const std::string build = folder.path("bringup/build");
+  tests::write_file(build, "#!/bin/sh\necho built: \"$@\"\nexit 1\n");
+  fs::permissions(build, fs::perms{0755});
+  for (const auto& [name, argument] : {std::pair{"run", "short"}, std::pair{"host", "base"}}) {
+    const CommandResult result =
+        run_command({folder.path("bringup") + "/" + name, argument, "--out", folder.path("s")});
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_THAT(result.output, HasSubstr("built: trigpoint_job\n"));
+    EXPECT_FALSE(fs::exists(folder.path("s")));
+  }
+}
+
+}  // namespace
+}  // namespace trigpoint
