@@ -13,9 +13,14 @@
 #include "verbs.hpp"
 
 #include <algorithm>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <utility>
 
 namespace trigpoint::cli {
@@ -106,6 +111,32 @@ int exit_code_of(const pipeline::MapLogResult& result) {
   return 0;
 }
 
+/// A folder for the truth of a scenario whose session has one already, to be appended from there;
+/// it goes with this object, with what the simulator leaves beside the truth.
+class PassingFolder {
+ public:
+  PassingFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "trigpoint-truth-XXXXXX").string();
+    if (::mkdtemp(name.data()) == nullptr) {
+      throw std::runtime_error("cannot make the folder " + name + ": " + std::strerror(errno));
+    }
+    path_ = name;
+  }
+
+  ~PassingFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+
+  PassingFolder(const PassingFolder&) = delete;
+  PassingFolder& operator=(const PassingFolder&) = delete;
+
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
 /// `refused_imu` becomes the sentence of an IMU that was refused for good while it ran;
 /// `not_resumed` tells that the robot was not found in the stored map.
 pipeline::MapLogResult map(const MapOptions& options, std::string& refused_imu, bool& not_resumed) {
@@ -124,7 +155,8 @@ pipeline::MapLogResult map(const MapOptions& options, std::string& refused_imu, 
     keep_datum(stored->datum, input.config.cores.gps_odometry);
     refuse_older_log(options, *stored, input.reader->summary());
   }
-  leave_truth(input, options.out);
+  std::optional<PassingFolder> passing;
+  leave_truth(input, options.resume.empty() ? options.out : passing.emplace().path());
   pipeline::MapLogResult result;
   {
     Progress progress("mapping");
@@ -193,7 +225,8 @@ void add_map(CLI::App& app, Chosen& chosen) {
           "--resume",
           options->resume,
           "a stored session that goes on with this log, near its last or first place: same "
-          "odom, map and datum, keyframes and trajectories appended; instead of --out")
+          "odom, map and datum; keyframes, trajectories, truth and run.yaml go on; instead of "
+          "--out")
       ->check(CLI::ExistingDirectory);
   verb->callback([options, &chosen] { chosen = [options] { return run(*options); }; });
 }

@@ -167,7 +167,7 @@ std::string print_run(const SessionData& data) {
 std::string print_alignment(const SessionData& data) {
   std::string text = "## Alignment of odom to map\n\n";
   if (data.alignment) {
-    const auto& [alignment, admitted, comment] = *data.alignment;
+    const auto& [alignment, admitted, comment, was_admitted] = *data.alignment;
     const auto sigma = [&](int i) { return std::sqrt(alignment.covariance(i, i)); };
     text += std::string(admitted ? "Admitted" : "**Not admitted by the gate**") +
             (comment.empty() ? "" : " (" + comment + ")") + ", odom epoch " +
