@@ -66,8 +66,8 @@ void add_config_options(CLI::App& verb, InputOptions& options);
 /// scenario is streamed without being written.
 Input open_input(const InputOptions& options);
 
-/// The truth of a scenario into the folder `session`, for when all is known to be right and nothing
-/// is refused any more; of a recorded drive nothing.
+/// The truth of a scenario into `session`, for when all is known to be right and nothing is refused
+/// any more; of a recorded drive nothing.
 void leave_truth(const Input& input, const std::string& session);
 
 /// The configuration alone, without a log.

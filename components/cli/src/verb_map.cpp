@@ -8,19 +8,15 @@
 #include "finish_session.hpp"
 #include "input.hpp"
 #include "interruption.hpp"
+#include "passing_folder.hpp"
 #include "progress.hpp"
 #include "told_once.hpp"
 #include "verbs.hpp"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstdlib>
-#include <cstring>
-#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <optional>
-#include <stdexcept>
 #include <utility>
 
 namespace trigpoint::cli {
@@ -111,32 +107,6 @@ int exit_code_of(const pipeline::MapLogResult& result) {
   return 0;
 }
 
-/// A folder for the truth of a scenario whose session has one already, to be appended from there;
-/// it goes with this object, with what the simulator leaves beside the truth.
-class PassingFolder {
- public:
-  PassingFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "trigpoint-truth-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) {
-      throw std::runtime_error("cannot make the folder " + name + ": " + std::strerror(errno));
-    }
-    path_ = name;
-  }
-
-  ~PassingFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-
-  PassingFolder(const PassingFolder&) = delete;
-  PassingFolder& operator=(const PassingFolder&) = delete;
-
-  const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
-};
-
 /// `refused_imu` becomes the sentence of an IMU that was refused for good while it ran;
 /// `not_resumed` tells that the robot was not found in the stored map.
 pipeline::MapLogResult map(const MapOptions& options, std::string& refused_imu, bool& not_resumed) {
@@ -225,8 +195,7 @@ void add_map(CLI::App& app, Chosen& chosen) {
           "--resume",
           options->resume,
           "a stored session that goes on with this log, near its last or first place: same "
-          "odom, map and datum; keyframes, trajectories, truth and run.yaml go on; instead of "
-          "--out")
+          "odom, map and datum, keyframes and trajectories appended; instead of --out")
       ->check(CLI::ExistingDirectory);
   verb->callback([options, &chosen] { chosen = [options] { return run(*options); }; });
 }
