@@ -334,8 +334,7 @@ std::string lost_end(const SessionData& data, const std::vector<MissedScans>& mi
   return std::to_string(end.scans) + " of " + std::to_string(of_last_drive) +
          " sweeps were never answered by the mapper, " +
          (end.after_ns ? "the last " + fixed(end.silence_s, 1) +
-                             " s: it did not come back to the "
-                             "end"
+                             " s: it did not come back before the end, or was that far behind"
                        : std::string("from the first to the last")) +
          ". What was driven then is not in the map.";
 }
