@@ -25,7 +25,7 @@ constexpr double kHang_s = 3.0;
 /// As long as the gate waits for a mapper (fusion_gate.lio_timeout_s), and some.
 constexpr double kOthersGap_s = 1.5;
 constexpr double kGoodGps_m = 0.15;      // issue: RMSE while GPS is good
-constexpr std::uint64_t kUncounted = 3;  ///< scans at the beginning and the end of a drive
+constexpr std::uint64_t kUncounted = 3;  ///< scans that a mapper refused with a reason
 
 TEST(Restart, of_each_process_in_one_drive_leaves_the_others_alone_and_the_session_whole) {
   const TemporaryFolder folder;

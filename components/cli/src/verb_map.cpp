@@ -8,6 +8,7 @@
 #include "finish_session.hpp"
 #include "input.hpp"
 #include "interruption.hpp"
+#include "passing_folder.hpp"
 #include "progress.hpp"
 #include "shell_word.hpp"
 #include "told_once.hpp"
@@ -173,7 +174,8 @@ MapOutcome map(MapOptions& options) {
       return outcome;
     }
   }
-  leave_truth(input, options.out);
+  std::optional<PassingFolder> passing;
+  leave_truth(input, options.resume.empty() ? options.out : passing.emplace().path());
   {
     Progress progress("mapping");
     outcome.result = pipeline::map_log(*input.reader,

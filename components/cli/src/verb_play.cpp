@@ -85,7 +85,10 @@ class SessionPart {
                          mode_of(config),
                          config.cores.gps_odometry.filter,
                          to_seconds(part_->last_ns() - part_->first_ns()),
-                         wall_s});
+                         wall_s,
+                         false,
+                         part_->begin_ns(),
+                         part_->end_ns()});
   }
 
   std::string folder_;
@@ -187,7 +190,7 @@ void add_play(CLI::App& app, Chosen& chosen) {
       ->capture_default_str();
   verb->add_option("--session",
                    options->session,
-                   "folder for the player's part of the results (fixes, counts, truth)");
+                   "folder for the player's part of the results (fixes, sweeps, counts, truth)");
   verb->add_option("--wait",
                    options->wait_s,
                    "wait this long for the three processes before the first message, s")

@@ -23,7 +23,9 @@ struct Estimate {
   std::string name;
   Trajectory trajectory;
   bool is_in_map{true};
-  std::optional<Trajectory> lio;  ///< to judge its steps against
+  std::optional<Trajectory> lio{};  ///< to judge its steps against
+  Breaks breaks{};
+  Breaks step_breaks{};
 };
 
 struct Reference {
@@ -89,12 +91,17 @@ std::vector<Estimate> estimates_of(const SessionData& session, Comparison& compa
                                    ": the session has no pose of it.");
     }
     if (!trajectory.empty()) {
-      estimates.push_back({name, trajectory, is_in_map, std::nullopt});
+      estimates.push_back({name,
+                           trajectory,
+                           is_in_map,
+                           std::nullopt,
+                           is_in_map ? session.run_begins() : session.odom_begins()});
     }
   };
   add(file::kFused, session.fused, true);
   if (!estimates.empty() && !session.lio.empty()) {
     estimates.back().lio = session.lio;
+    estimates.back().step_breaks = session.odom_begins();
   }
   add(file::kFusedSmoothed, session.fused_smoothed, true);
   add(file::kLio, session.lio, false);
@@ -153,6 +160,7 @@ Compared compare(const Estimate& estimate,
   EvaluationOptions options;
   options.largest_gap_ns = largest_gap_ns;
   options.outages = outages;
+  options.breaks = estimate.breaks;
   const Association association =
       reference.kind == ReferenceKind::kPoses
           ? associate(estimate.trajectory, reference.trajectory, largest_gap_ns)
@@ -164,8 +172,9 @@ Compared compare(const Estimate& estimate,
   compared.evaluation = evaluate_pairs(association, reference.kind, options);
   compared.evaluation.estimate_name = estimate.name;
   compared.evaluation.reference_name = reference.name;
-  compared.evaluation.step = estimate.lio ? largest_step(estimate.trajectory, *estimate.lio)
-                                          : largest_step(estimate.trajectory);
+  compared.evaluation.step =
+      estimate.lio ? largest_step(estimate.trajectory, *estimate.lio, estimate.step_breaks)
+                   : largest_step(estimate.trajectory, estimate.breaks);
   compared.pairs = association.pairs;
   compared.is_in_reference_frame = estimate.is_in_map;
   return compared;

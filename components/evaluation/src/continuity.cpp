@@ -25,15 +25,17 @@ void keep_larger(Step& largest, const Pose& expected, const StampedPose& actual)
 
 }  // namespace
 
-Step largest_step(const Trajectory& fused, const Trajectory& lio) {
+Step largest_step(const Trajectory& fused, const Trajectory& lio, const Breaks& breaks) {
   Step largest;
   largest.relative_to_lio = true;
   std::optional<Pose> T_map_odom;
+  Nanoseconds before_ns = 0;
   for (const auto& pose : fused) {
     const auto odom = pose_at(lio, pose.stamp_ns);
-    if (odom && T_map_odom) {
+    if (odom && T_map_odom && !is_between(breaks, before_ns, pose.stamp_ns)) {
       keep_larger(largest, *T_map_odom * *odom, pose);
     }
+    before_ns = pose.stamp_ns;
     T_map_odom = odom ? std::optional<Pose>(pose.pose * odom->inverse()) : std::nullopt;
   }
   return largest;
@@ -64,10 +66,12 @@ Step largest_step_over(const Trajectory& fused, const Trajectory& odom, Nanoseco
   return largest;
 }
 
-Step largest_step(const Trajectory& trajectory) {
+Step largest_step(const Trajectory& trajectory, const Breaks& breaks) {
   Step largest;
   for (std::size_t i = 1; i < trajectory.size(); ++i) {
-    keep_larger(largest, trajectory[i - 1].pose, trajectory[i]);
+    if (!is_between(breaks, trajectory[i - 1].stamp_ns, trajectory[i].stamp_ns)) {
+      keep_larger(largest, trajectory[i - 1].pose, trajectory[i]);
+    }
   }
   return largest;
 }

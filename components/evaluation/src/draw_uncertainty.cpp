@@ -150,7 +150,8 @@ class UncertaintyPicture {
   DataFile alignment_rows(std::size_t axis) const {
     DataFile rows;
     for (const auto& row : data_.gate) {
-      rows.add({time(row.stamp_ns), row.position_sigma_m.at(axis)});
+      const double sigma_m = row.position_sigma_m.at(axis);
+      rows.add({time(row.stamp_ns), is_known_sigma(sigma_m) ? sigma_m : kNaN});
     }
     return with_a_row(std::move(rows));
   }

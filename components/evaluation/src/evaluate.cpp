@@ -30,12 +30,13 @@ Score score_of(const std::vector<PosePair>& pairs, AlignmentKind kind) {
 RelativeError relative_of(const std::vector<PosePair>& pairs,
                           ReferenceKind kind,
                           const std::optional<Pose>& T_reference_estimate,
-                          double length_m) {
+                          double length_m,
+                          const Breaks& breaks) {
   if (kind == ReferenceKind::kPoses) {
-    return relative_error(pairs, length_m);
+    return relative_error(pairs, length_m, breaks);
   }
-  return relative_position_error(place_estimates(T_reference_estimate.value_or(Pose{}), pairs),
-                                 length_m);
+  return relative_position_error(
+      place_estimates(T_reference_estimate.value_or(Pose{}), pairs), length_m, breaks);
 }
 
 std::vector<PosePair> outside(const std::vector<PosePair>& pairs,
@@ -68,10 +69,11 @@ Evaluation evaluate_pairs(const Association& association,
   }
   const auto& T_reference_estimate = result.scores[1].T_reference_estimate;
   for (const double length_m : kLengths_m) {
-    result.relative.push_back(relative_of(pairs, kind, T_reference_estimate, length_m));
+    result.relative.push_back(
+        relative_of(pairs, kind, T_reference_estimate, length_m, options.breaks));
   }
   if (kind == ReferenceKind::kPoses) {
-    result.end_to_end = end_to_end(pairs);
+    result.end_to_end = end_to_end(pairs, options.breaks);
   }
   if (!options.outages.empty()) {
     result.good = absolute_error(outside(pairs, options.outages));
@@ -85,8 +87,8 @@ Evaluation evaluate(const Trajectory& estimate,
                     const EvaluationOptions& options) {
   auto result = evaluate_pairs(
       associate(estimate, reference, options.largest_gap_ns), ReferenceKind::kPoses, options);
-  result.step =
-      options.lio != nullptr ? largest_step(estimate, *options.lio) : largest_step(estimate);
+  result.step = options.lio != nullptr ? largest_step(estimate, *options.lio, options.breaks)
+                                       : largest_step(estimate, options.breaks);
   return result;
 }
 

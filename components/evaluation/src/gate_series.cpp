@@ -17,6 +17,29 @@ bool is_known_sigma(double sigma_m) {
   return std::isfinite(sigma_m) && sigma_m > 0.0 && sigma_m < kUnknownSigma_m;
 }
 
+GateTotals totals_of(const std::vector<FusionStatus>& rows) {
+  GateTotals totals;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const bool is_last = i + 1 == rows.size() || rows[i + 1].fixes_seen < rows[i].fixes_seen;
+    if (!is_last) {
+      continue;
+    }
+    totals.fixes_seen += rows[i].fixes_seen;
+    totals.fixes_used += rows[i].fixes_used;
+    for (const NamedCount& verdict : rows[i].verdicts) {
+      const auto same = std::find_if(totals.verdicts.begin(),
+                                     totals.verdicts.end(),
+                                     [&](const auto& sum) { return sum.name == verdict.name; });
+      if (same == totals.verdicts.end()) {
+        totals.verdicts.push_back(verdict);
+      } else {
+        same->count += verdict.count;
+      }
+    }
+  }
+  return totals;
+}
+
 std::vector<SourceRun> source_runs(const std::vector<FusionStatus>& rows, std::size_t axis) {
   std::vector<SourceRun> runs;
   for (std::size_t i = 0; i < rows.size();) {

@@ -22,6 +22,16 @@ inline constexpr double kLowestError_m = 1e-3;
 /// Finite, positive, and not that of a kUnknownVariance.
 bool is_known_sigma(double sigma_m);
 
+/// What all gates of a session counted: one that was started again, or that goes on with a session,
+/// counts from zero.
+struct GateTotals {
+  std::uint64_t fixes_seen{0};
+  std::uint64_t fixes_used{0};
+  std::vector<NamedCount> verdicts;
+};
+
+GateTotals totals_of(const std::vector<FusionStatus>& rows);
+
 /// A stretch in which the gate took an axis from one source, until it took it from the next one.
 struct SourceRun {
   AxisSource source;

@@ -132,7 +132,8 @@ std::string plot_sigma(const SessionData& data, const TimePlots& time, std::size
     return is_known_sigma(sigma_m) ? std::max(sigma_m, kLowestSigma_m) : kNaN;
   };
   const auto of_alignment = [&](const FusionStatus& row) {
-    return std::max(row.position_sigma_m.at(axis), kLowestSigma_m);
+    const double sigma_m = row.position_sigma_m.at(axis);
+    return is_known_sigma(sigma_m) ? std::max(sigma_m, kLowestSigma_m) : kNaN;
   };
   const auto threshold = [&](const FusionStatus& row) { return row.axes.at(axis).threshold_m; };
   const std::vector<PlotCurve> curves{

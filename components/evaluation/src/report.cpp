@@ -2,6 +2,7 @@
 // Copyright the Trigpoint developers
 #include "trigpoint/evaluation/report.hpp"
 
+#include "gate_series.hpp"
 #include "pictures.hpp"
 #include "report_page.hpp"
 #include "report_sections.hpp"
@@ -88,21 +89,48 @@ std::string joined(const std::vector<std::string>& sections) {
 
 /// What the gate refused most fixes for, when it used none of them; empty when it used some.
 std::string refusal_of_all(const SessionData& data) {
-  if (data.gate.empty() || data.gate.back().fixes_seen == 0 || data.gate.back().fixes_used > 0) {
+  const GateTotals totals = totals_of(data.gate);
+  if (totals.fixes_seen == 0 || totals.fixes_used > 0) {
     return "";
   }
-  const auto& verdicts = data.gate.back().verdicts;
+  const auto& verdicts = totals.verdicts;
   const auto most = std::max_element(
       verdicts.begin(), verdicts.end(), [](auto& a, auto& b) { return a.count < b.count; });
-  return "None of " + std::to_string(data.gate.back().fixes_seen) + " fixes was used" +
+  return "None of " + std::to_string(totals.fixes_seen) + " fixes was used" +
          (most == verdicts.end()
               ? std::string(".")
               : ", most often because: " + most->name + " (" + std::to_string(most->count) + ").");
 }
 
+/// Of an odom epoch that was not aligned the map holds nothing; empty when the last one was.
+std::string unaligned_end(const SessionData& data) {
+  if (data.scans.empty()) {
+    return "";
+  }
+  const std::uint32_t epoch = data.scans.back().status.odom_epoch;
+  std::size_t scans = 0;
+  for (const auto& scan : data.scans) {
+    if (scan.status.odom_epoch == epoch) {
+      ++scans;
+      if (scan.status.aligned) {
+        return "";
+      }
+    }
+  }
+  return "The drive ended in odom epoch " + std::to_string(epoch) +
+         ", which was not aligned with map: " +
+         (scans == 1 ? "its one scan is" : "its " + std::to_string(scans) + " scans are") +
+         " left out of the map.";
+}
+
 /// Fixes that no alignment came of are a failure; without fixes nobody expects one.
-std::vector<std::string> find_failures(const SessionData& data, const Accounting& found) {
+std::vector<std::string> find_failures(const SessionData& data,
+                                       const Accounting& found,
+                                       const std::vector<MissedScans>& missed) {
   std::vector<std::string> failures;
+  if (std::string lost = lost_end(data, missed); !lost.empty() && !data.interrupted()) {
+    failures.push_back(std::move(lost));
+  }
   // What was on its way while a process was down is listed under Restarts.
   if (!found.losses.empty() && !data.interrupted() && data.restarts.empty()) {
     failures.push_back("Not all messages are accounted for: " + found.losses.front() +
@@ -110,7 +138,12 @@ std::vector<std::string> find_failures(const SessionData& data, const Accounting
   }
   const bool lio_only = data.run && data.run->mode == "lio";
   const bool admitted = data.alignment && data.alignment->admitted;
-  if (!lio_only && !admitted && data.fixes_fed() > 0) {
+  const bool was_admitted = data.alignment && data.alignment->was_admitted;
+  if (!lio_only && was_admitted && data.fixes_fed() > 0) {
+    if (std::string end = unaligned_end(data); !end.empty()) {
+      failures.push_back(std::move(end));
+    }
+  } else if (!lio_only && !admitted && data.fixes_fed() > 0) {
     failures.push_back("No alignment of odom with map was admitted although there were " +
                        std::to_string(data.fixes_fed()) +
                        " fixes: the map is not georeferenced reliably.");
@@ -136,8 +169,9 @@ ReportResult write_report(const std::string& session_folder, const ReportOptions
   }
   const PointCloud& shown = map_under(data, map);
   const Accounting found = account(data);
+  const std::vector<MissedScans> missed = missed_scans_of(data);
   result.failures = options.failures;
-  for (std::string& failure : find_failures(data, found)) {
+  for (std::string& failure : find_failures(data, found, missed)) {
     result.failures.push_back(std::move(failure));
   }
   if (options.pictures) {
@@ -145,7 +179,7 @@ ReportResult write_report(const std::string& session_folder, const ReportOptions
   }
   const auto scores = score_session(data);
   std::vector<std::string> sections{print_run(data),
-                                    print_restarts(data),
+                                    print_restarts(data, missed),
                                     "## Errors\n\n" + print_scores(data, scores),
                                     print_alignment(data),
                                     print_gate(data),

@@ -2,6 +2,7 @@
 // Copyright the Trigpoint developers
 #include "report_page.hpp"
 
+#include "gate_series.hpp"
 #include "html.hpp"
 #include "page_document.hpp"
 #include "page_files.hpp"
@@ -69,22 +70,28 @@ std::string outage_tile(const SessionData& data) {
 
 std::string tiles(const SessionData& data, const PageContent& content) {
   std::string text = error_tile(content);
-  const auto span = data.span();
-  const double duration_s = to_seconds(span.end_ns - span.begin_ns);
   if (!data.lio.empty()) {
-    text += tile(fixed(length_of(data.lio), 1) + " m", "driven", fixed(duration_s, 1) + " s");
+    text += tile(fixed(length_of(data.lio, data.odom_begins()), 1) + " m",
+                 "driven",
+                 fixed(data.driven_s(), 1) + " s");
   }
   text += outage_tile(data);
   if (!data.gate.empty()) {
-    text += tile(std::to_string(data.gate.back().fixes_used),
-                 "fixes used",
-                 "of " + std::to_string(data.gate.back().fixes_seen) + " seen, gate mode " +
-                     data.gate.back().mode);
+    const GateTotals totals = totals_of(data.gate);
+    text += tile(
+        std::to_string(totals.fixes_used),
+        "fixes used",
+        "of " + std::to_string(totals.fixes_seen) + " seen, gate mode " + data.gate.back().mode);
   }
   if (data.run) {
-    text += tile(fixed(data.run->data_s / data.run->wall_s, 2) + " x",
-                 "real time",
-                 fixed(data.run->wall_s, 1) + " s of processing");
+    double data_s = 0.0;
+    double wall_s = 0.0;
+    for (const exporter::RunInfo& run : data.runs()) {
+      data_s += run.data_s;
+      wall_s += run.wall_s;
+    }
+    text +=
+        tile(fixed(data_s / wall_s, 2) + " x", "real time", fixed(wall_s, 1) + " s of processing");
   }
   return "<div class=\"tiles\">\n" + text + "</div>\n";
 }

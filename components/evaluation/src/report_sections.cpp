@@ -4,6 +4,7 @@
 
 #include "trigpoint/evaluation/plane_thickness.hpp"
 
+#include "gate_series.hpp"
 #include "table.hpp"
 
 #include <algorithm>
@@ -27,6 +28,11 @@ std::string sigma_text(double yaw_sigma_rad, const std::array<double, 3>& sigma_
   return "yaw " + fixed(yaw_sigma_rad * kDegreesPerRadian, 3) + " deg, east " +
          fixed(sigma_m[0], 3) + " m, north " + fixed(sigma_m[1], 3) + " m, up " +
          fixed(sigma_m[2], 3) + " m";
+}
+
+bool is_known_sigma_of(const FusionStatus& row) {
+  return is_known_sigma(row.yaw_sigma_rad) &&
+         std::all_of(row.position_sigma_m.begin(), row.position_sigma_m.end(), is_known_sigma);
 }
 
 std::string transform_text(const YawPose& T) {
@@ -107,6 +113,10 @@ std::string place_of_map(const SessionData& data, const SessionMap& map) {
            std::string(file::kAlignment) + " was left.";
   }
   const bool corrected = std::filesystem::exists(data.path(file::kKeyframePoses));
+  if (data.alignment->was_admitted) {
+    return "Its frame is map, by alignments that were admitted while it was driven; what is of an "
+           "odom epoch without one is left out.";
+  }
   return data.alignment->admitted
              ? corrected ? "Its frame is map, every keyframe placed by the pose graph."
                          : "Its frame is map, placed with the alignment above."
@@ -133,6 +143,40 @@ std::string thickness_text(const SessionMap& map) {
          ".\n";
 }
 
+std::string how_text(const exporter::RunInfo& run) {
+  return (run.how == "dds" ? "three processes over DDS" : run.how) + ", gate mode `" + run.mode +
+         "`, GPS filter `" + run.gps_filter + "`";
+}
+
+std::string pace_text(double data_s, double wall_s) {
+  return fixed(wall_s, 1) + " s, " + fixed(data_s / wall_s, 2) + " times real time";
+}
+
+/// One, or all that a session has been resumed with.
+std::string print_runs(const std::vector<exporter::RunInfo>& runs) {
+  if (runs.empty()) {
+    return "";
+  }
+  if (runs.size() == 1) {
+    const exporter::RunInfo& run = runs.front();
+    return "- Log: `" + run.log + "`, " + fixed(run.data_s, 1) + " s\n- Run: " + how_text(run) +
+           "\n- Processing time: " + pace_text(run.data_s, run.wall_s) + "\n";
+  }
+  std::string text = "- Logs, of which each went on with what was there:\n";
+  double data_s = 0.0;
+  double wall_s = 0.0;
+  for (const exporter::RunInfo& run : runs) {
+    data_s += run.data_s;
+    wall_s += run.wall_s;
+    text += "  - `" + run.log + "`";
+    text += run.how.empty() ? ""
+                            : ", " + fixed(run.data_s, 1) + " s: " + how_text(run) +
+                                  "; processing time " + pace_text(run.data_s, run.wall_s);
+    text += run.interrupted ? ", interrupted by the user\n" : "\n";
+  }
+  return text + "- Processing time in all: " + pace_text(data_s, wall_s) + "\n";
+}
+
 }  // namespace
 
 std::string print_run(const SessionData& data) {
@@ -140,14 +184,7 @@ std::string print_run(const SessionData& data) {
   if (data.interrupted()) {
     text += "**The run was interrupted by the user**; this is about what was done so far.\n\n";
   }
-  if (data.run) {
-    const auto& run = *data.run;
-    text += "- Log: `" + run.log + "`, " + fixed(run.data_s, 1) +
-            " s\n- Run: " + (run.how == "dds" ? "three processes over DDS" : run.how) +
-            ", gate mode `" + run.mode + "`, GPS filter `" + run.gps_filter +
-            "`\n- Processing time: " + fixed(run.wall_s, 1) + " s, " +
-            fixed(run.data_s / run.wall_s, 2) + " times real time\n";
-  }
+  text += print_runs(data.runs());
   if (std::filesystem::exists(data.path(file::kConfig))) {
     text +=
         std::string("- Effective configuration: [") + file::kConfig + "](" + file::kConfig + ")\n";
@@ -159,7 +196,8 @@ std::string print_run(const SessionData& data) {
                  : ", elected at " + exporter::stamp_text(data.datum->elected_ns) + "\n");
   }
   if (!data.lio.empty()) {
-    text += "- Distance driven (lio.tum): " + fixed(length_of(data.lio), 1) + " m\n";
+    text += "- Distance driven (lio.tum): " + fixed(length_of(data.lio, data.odom_begins()), 1) +
+            " m\n";
   }
   return text;
 }
@@ -167,19 +205,29 @@ std::string print_run(const SessionData& data) {
 std::string print_alignment(const SessionData& data) {
   std::string text = "## Alignment of odom to map\n\n";
   if (data.alignment) {
-    const auto& [alignment, admitted, comment] = *data.alignment;
+    const exporter::AlignmentRecord& record = *data.alignment;
+    const Alignment& alignment = record.alignment;
     const auto sigma = [&](int i) { return std::sqrt(alignment.covariance(i, i)); };
-    text += std::string(admitted ? "Admitted" : "**Not admitted by the gate**") +
-            (comment.empty() ? "" : " (" + comment + ")") + ", odom epoch " +
-            std::to_string(alignment.odom_epoch) + ": " + transform_text(alignment.T_map_odom) +
-            ".\n\nIts sigma: " + sigma_text(sigma(0), {sigma(1), sigma(2), sigma(3)}) + ".\n";
+    const std::string verdict = record.admitted       ? "Admitted"
+                                : record.was_admitted ? "**Not admitted at the end**"
+                                                      : "**Not admitted by the gate**";
+    text += verdict + (record.comment.empty() ? "" : " (" + record.comment + ")") +
+            ", odom epoch " + std::to_string(alignment.odom_epoch) + ": " +
+            transform_text(alignment.T_map_odom) + ".\n\n" +
+            (exporter::is_known(alignment)
+                 ? "Its sigma: " + sigma_text(sigma(0), {sigma(1), sigma(2), sigma(3)}) + ".\n"
+                 : "How good it is nobody knows.\n");
   } else {
     text += "No alignment was found: nothing in this session is georeferenced by fusion.\n";
   }
-  const auto last = std::find_if(
-      data.gate.rbegin(), data.gate.rend(), [](const auto& row) { return row.aligned; });
+  const auto last = std::find_if(data.gate.rbegin(), data.gate.rend(), [](const auto& row) {
+    return row.aligned && is_known_sigma_of(row);
+  });
   if (last != data.gate.rend()) {
-    text += "\nAt the end: " + transform_text(last->T_map_odom) +
+    text += (last == data.gate.rbegin()
+                 ? "\nAt the end: "
+                 : "\nIn force until " + exporter::stamp_text(last->stamp_ns) + ": ") +
+            transform_text(last->T_map_odom) +
             ". Its sigma: " + sigma_text(last->yaw_sigma_rad, last->position_sigma_m) + ".\n";
   }
   return text;
@@ -191,10 +239,11 @@ std::string print_gate(const SessionData& data) {
     return text + "No status of the gate was recorded.\n";
   }
   const auto& last = data.gate.back();
-  text += "Mode `" + last.mode + "`. Fixes seen " + std::to_string(last.fixes_seen) + ", used " +
-          std::to_string(last.fixes_used) + ".\n\n";
+  const GateTotals totals = totals_of(data.gate);
+  text += "Mode `" + last.mode + "`. Fixes seen " + std::to_string(totals.fixes_seen) + ", used " +
+          std::to_string(totals.fixes_used) + ".\n\n";
   Table verdicts({"verdict", "fixes"});
-  for (const auto& [name, count] : last.verdicts) {
+  for (const auto& [name, count] : totals.verdicts) {
     verdicts.add({name, std::to_string(count)});
   }
   if (!verdicts.is_empty()) {
@@ -223,8 +272,13 @@ std::string print_times(const SessionData& data) {
   }
   std::sort(times_ms.begin(), times_ms.end());
   Table table({"scans", "median ms", "p99 ms", "max ms", "mapper alone, times real time"});
-  const double span_s =
-      to_seconds(data.scans.back().status.stamp_ns - data.scans.front().status.stamp_ns);
+  const Breaks begins = data.run_begins();
+  double span_s = 0.0;
+  for (std::size_t i = 1; i < data.scans.size(); ++i) {
+    const Nanoseconds before_ns = data.scans[i - 1].status.stamp_ns;
+    const Nanoseconds stamp_ns = data.scans[i].status.stamp_ns;
+    span_s += is_between(begins, before_ns, stamp_ns) ? 0.0 : to_seconds(stamp_ns - before_ns);
+  }
   table.add({std::to_string(times_ms.size()),
              fixed(percentile(times_ms, 0.5), 2),
              fixed(percentile(times_ms, 0.99), 2),

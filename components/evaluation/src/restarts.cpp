@@ -5,9 +5,7 @@
 #include "session_data.hpp"
 #include "table.hpp"
 
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <ctime>
 #include <fstream>
 #include <sstream>
@@ -16,8 +14,6 @@
 namespace trigpoint::evaluation {
 
 namespace {
-
-constexpr double kGapIntervals = 1.5;
 
 std::string local_time(std::int64_t unix_s) {
   const std::time_t seconds = unix_s;
@@ -58,33 +54,9 @@ std::vector<Restart> read_restarts(const std::string& file) {
   return restarts;
 }
 
-std::vector<MissedScans> find_missed_scans(const std::vector<exporter::LoggedScan>& scans) {
-  std::vector<double> intervals_s;
-  for (std::size_t i = 1; i < scans.size(); ++i) {
-    intervals_s.push_back(to_seconds(scans[i].status.stamp_ns - scans[i - 1].status.stamp_ns));
-  }
-  if (intervals_s.empty()) {
-    return {};
-  }
-  std::vector<double> sorted = intervals_s;
-  std::nth_element(sorted.begin(),
-                   sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
-                   sorted.end());
-  const double usual_s = sorted[sorted.size() / 2];
-  std::vector<MissedScans> missed;
-  for (std::size_t i = 0; i < intervals_s.size(); ++i) {
-    if (usual_s > 0.0 && intervals_s[i] > kGapIntervals * usual_s) {
-      missed.push_back({scans[i].status.stamp_ns,
-                        scans[i + 1].status.stamp_ns,
-                        static_cast<std::uint64_t>(std::llround(intervals_s[i] / usual_s)) - 1});
-    }
-  }
-  return missed;
-}
-
-std::string print_restarts(const SessionData& data) {
+std::string print_restarts(const SessionData& data, const std::vector<MissedScans>& missed) {
   if (data.restarts.empty()) {
-    return "";
+    return missed.empty() ? "" : "## Scans missed\n\n" + print_missed(data, missed) + "\n";
   }
   std::string text =
       "## Restarts\n\n**Processes failed in the middle of the drive**; what each said is in "
@@ -97,18 +69,7 @@ std::string print_restarts(const SessionData& data) {
                restart.what,
                restart.restarted ? "started again" : "given up"});
   }
-  text += table.str() + "\n";
-  const std::vector<MissedScans> missed = find_missed_scans(data.scans);
-  std::uint64_t sum = 0;
-  std::string list;
-  for (const MissedScans& gap : missed) {
-    sum += gap.scans;
-    list += "- " + std::to_string(gap.scans) + " between " + exporter::stamp_text(gap.after_ns) +
-            " and " + exporter::stamp_text(gap.before_ns) + " (" +
-            fixed(to_seconds(gap.before_ns - gap.after_ns), 2) + " s)\n";
-  }
-  return text + "Scans missed: " + std::to_string(sum) + (list.empty() ? ".\n" : "\n\n" + list) +
-         "\n";
+  return text + table.str() + "\n" + print_missed(data, missed) + "\n";
 }
 
 }  // namespace trigpoint::evaluation

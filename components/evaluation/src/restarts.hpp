@@ -4,8 +4,7 @@
 // what the mapper missed meanwhile.
 #pragma once
 
-#include "trigpoint/base/time.hpp"
-#include "trigpoint/export/session.hpp"
+#include "missed_scans.hpp"
 
 #include <cstdint>
 #include <string>
@@ -27,16 +26,7 @@ struct Restart {
 /// Throws std::runtime_error with file and line.
 std::vector<Restart> read_restarts(const std::string& file);
 
-struct MissedScans {
-  Nanoseconds after_ns{0};   ///< the scan before the gap
-  Nanoseconds before_ns{0};  ///< the scan after it
-  std::uint64_t scans{0};
-};
-
-/// Gaps between processed scans, by their usual interval.
-std::vector<MissedScans> find_missed_scans(const std::vector<exporter::LoggedScan>& scans);
-
-/// From "##" on; empty when nothing failed.
-std::string print_restarts(const SessionData& data);
+/// From "##" on, with the scans that were missed; empty when nothing failed and none was missed.
+std::string print_restarts(const SessionData& data, const std::vector<MissedScans>& missed);
 
 }  // namespace trigpoint::evaluation

@@ -73,7 +73,14 @@ void load_logs(SessionData& data) {
     data.gps_status = exporter::read_gps_status(path);
   });
   load(data, file::kScans, Need::kExpected, [&](const auto& path) {
+    data.has_scan_log = true;
     data.scans = exporter::read_scans(path);
+  });
+  load(data, file::kSweeps, Need::kOptional, [&](const auto& path) {
+    data.sweeps = exporter::read_sweeps(path);
+    std::stable_sort(data.sweeps.begin(), data.sweeps.end(), [](const auto& a, const auto& b) {
+      return a.arrival_ns < b.arrival_ns;
+    });
   });
   load(data, kRestarts, Need::kOptional, [&](const auto& path) {
     data.restarts = read_restarts(path);
@@ -111,6 +118,11 @@ void load_records(SessionData& data) {
   }
   load(data, file::kAlignment, Need::kOptional, [&](const auto& path) {
     data.alignment = exporter::read_alignment(path);
+    if (data.alignment->admitted && !exporter::is_known(data.alignment->alignment)) {
+      data.alignment->admitted = false;
+      data.alignment->was_admitted = true;
+      data.alignment->comment = "not admitted any more: nobody knew at the end how good it was";
+    }
   });
 }
 
@@ -199,6 +211,14 @@ void check_truth(SessionData& data) {
   data.truth.clear();
 }
 
+std::optional<Nanoseconds> last_before(const Trajectory& trajectory, Nanoseconds stamp_ns) {
+  const auto after = std::lower_bound(
+      trajectory.begin(), trajectory.end(), stamp_ns, [](const auto& pose, Nanoseconds at_ns) {
+        return pose.stamp_ns < at_ns;
+      });
+  return after == trajectory.begin() ? std::nullopt : std::optional(std::prev(after)->stamp_ns);
+}
+
 bool holds_a_session(const std::string& folder) {
   const auto names = {file::kRun,
                       file::kConfig,
@@ -241,11 +261,45 @@ std::vector<Nanoseconds> SessionData::accepted_fixes_ns() const {
   return stamps;
 }
 
+std::vector<exporter::RunInfo> SessionData::runs() const {
+  std::vector<exporter::RunInfo> all = run ? run->before : std::vector<exporter::RunInfo>{};
+  if (run) {
+    all.push_back(*run);
+  }
+  return all;
+}
+
+Breaks SessionData::run_begins() const {
+  Breaks begins;
+  const std::vector<exporter::RunInfo> all = runs();
+  for (std::size_t i = 1; i < all.size(); ++i) {
+    if (all[i].begin_ns != 0) {
+      begins.push_back(all[i].begin_ns);
+    }
+  }
+  std::sort(begins.begin(), begins.end());
+  return begins;
+}
+
+Breaks SessionData::odom_begins() const {
+  Breaks begins = run_begins();
+  for (std::size_t i = 1; i < scans.size(); ++i) {
+    if (scans[i].status.odom_epoch != scans[i - 1].status.odom_epoch) {
+      begins.push_back(scans[i].status.stamp_ns);
+    }
+  }
+  std::sort(begins.begin(), begins.end());
+  return begins;
+}
+
 std::vector<Window> SessionData::outages() const {
   const auto stamps = accepted_fixes_ns();
+  const Breaks begins = run_begins();
   std::vector<Nanoseconds> intervals;
   for (std::size_t i = 1; i < stamps.size(); ++i) {
-    intervals.push_back(stamps[i] - stamps[i - 1]);
+    if (!is_between(begins, stamps[i - 1], stamps[i])) {
+      intervals.push_back(stamps[i] - stamps[i - 1]);
+    }
   }
   Nanoseconds shortest_ns = 2 * kNanosecondsPerSecond;
   if (!intervals.empty()) {
@@ -254,7 +308,17 @@ std::vector<Window> SessionData::outages() const {
     shortest_ns = std::max(shortest_ns, from_seconds(kUsualIntervals * to_seconds(*middle)));
   }
   const auto& newest = fused.empty() ? lio : fused;
-  return find_outages(stamps, newest.empty() ? 0 : newest.back().stamp_ns, shortest_ns);
+  std::vector<Window> found =
+      find_outages(stamps, newest.empty() ? 0 : newest.back().stamp_ns, shortest_ns);
+  for (Window& window : found) {  // one that goes to the end of its run ends there
+    if (is_between(begins, window.begin_ns, window.end_ns)) {
+      const auto next = std::upper_bound(begins.begin(), begins.end(), window.begin_ns);
+      window.end_ns = last_before(newest, *next).value_or(window.begin_ns);
+    }
+  }
+  std::erase_if(
+      found, [&](const Window& window) { return window.end_ns - window.begin_ns <= shortest_ns; });
+  return found;
 }
 
 Window SessionData::span() const {
@@ -273,6 +337,21 @@ Window SessionData::span() const {
     include(row.stamp_ns);
   }
   return span.begin_ns <= span.end_ns ? span : Window{};
+}
+
+double SessionData::driven_s() const {
+  const Window whole = span();
+  Nanoseconds driven_ns = whole.end_ns - whole.begin_ns;
+  for (const Nanoseconds begin_ns : run_begins()) {
+    Nanoseconds end_ns = std::numeric_limits<Nanoseconds>::min();
+    for (const auto* trajectory : {&fused, &lio, &gps}) {
+      end_ns = std::max(end_ns, last_before(*trajectory, begin_ns).value_or(end_ns));
+    }
+    if (end_ns > whole.begin_ns && begin_ns < whole.end_ns) {
+      driven_ns -= begin_ns - end_ns;
+    }
+  }
+  return to_seconds(driven_ns);
 }
 
 std::size_t SessionData::fixes_fed() const {

@@ -6,6 +6,7 @@
 #include "trigpoint/evaluation/report.hpp"
 #include "trigpoint/export/session.hpp"
 
+#include "missed_scans.hpp"
 #include "restarts.hpp"
 #include <Eigen/Core>
 
@@ -25,7 +26,7 @@ struct SessionData {
   std::string folder;
   std::vector<std::string> problems;
   std::vector<std::string> damaged;  ///< those of them that are of what cannot be read in a file
-  std::optional<exporter::RunInfo> run;
+  std::optional<exporter::RunInfo> run;  ///< the newest one
   std::optional<Datum> datum;
   std::optional<exporter::AlignmentRecord> alignment;
   Trajectory fused;
@@ -39,6 +40,8 @@ struct SessionData {
   std::vector<FusionStatus> gate;
   std::vector<GpsStatus> gps_status;
   std::vector<exporter::LoggedScan> scans;
+  bool has_scan_log{false};  ///< a mapper had a part in it, if only for a moment
+  std::vector<exporter::LoggedSweep> sweeps;
   std::vector<ProgramCounts> counts;
   std::vector<Restart> restarts;
   std::int64_t datum_fixes{10};  ///< that an election takes, of the session's configuration
@@ -48,11 +51,23 @@ struct SessionData {
   /// fed at all. In order of time.
   std::vector<Nanoseconds> accepted_fixes_ns() const;
 
-  /// Gaps between accepted fixes: above 2 s, and above 2.5 times the usual interval.
+  /// Everything that was run, oldest first; those before the newest when a session was resumed.
+  std::vector<exporter::RunInfo> runs() const;
+
+  /// When the runs after the first one began, as far as that is known.
+  Breaks run_begins() const;
+
+  /// And the first scans of odom epochs after the first one.
+  Breaks odom_begins() const;
+
+  /// Gaps between accepted fixes of one run: above 2 s, and above 2.5 times the usual interval.
   std::vector<Window> outages() const;
 
   /// First and last stamp of anything; zero without anything.
   Window span() const;
+
+  /// Of that, without what is between two runs.
+  double driven_s() const;
 
   bool interrupted() const { return run && run->interrupted; }
 

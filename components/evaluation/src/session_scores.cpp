@@ -5,6 +5,7 @@
 #include "fix_reference.hpp"
 #include "table.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace trigpoint::evaluation {
@@ -28,11 +29,35 @@ std::vector<Named> estimates_of(const SessionData& data) {
   return estimates;
 }
 
+/// odom begins anew with each epoch, map does not.
+Breaks breaks_of(const SessionData& data, const std::string& estimate) {
+  return estimate == file::kLio ? data.odom_begins() : data.run_begins();
+}
+
+/// Runs of a session in whose time truth.tum has no pose.
+std::string print_runs_without_truth(const SessionData& data) {
+  const std::vector<exporter::RunInfo> runs = data.runs();
+  std::string text;
+  for (std::size_t i = 0; runs.size() > 1 && !data.truth.empty() && i < runs.size(); ++i) {
+    const bool is_last = i + 1 == runs.size();
+    const auto is_of_run = [&](const exporter::StampedPose& pose) {
+      return (i == 0 || pose.stamp_ns >= runs[i].begin_ns) &&
+             (is_last || pose.stamp_ns < runs[i + 1].begin_ns);
+    };
+    if (std::none_of(data.truth.begin(), data.truth.end(), is_of_run)) {
+      text += "**" + std::string(file::kTruth) + " holds nothing of the run of `" + runs[i].log +
+              "`: that part is not scored against it.**\n\n";
+    }
+  }
+  return text;
+}
+
 ScoreBlock score_against_truth(const SessionData& data) {
   ScoreBlock block{file::kTruth, "", {}};
   EvaluationOptions options;
   options.outages = data.outages();
   for (const auto& [name, trajectory] : estimates_of(data)) {
+    options.breaks = breaks_of(data, name);
     auto& result = block.evaluations.emplace_back(evaluate(trajectory, data.truth, options));
     result.estimate_name = name;
   }
@@ -47,6 +72,7 @@ ScoreBlock score_against_fixes(const SessionData& data,
   EvaluationOptions options;
   options.outages = data.outages();
   for (const auto& [estimate, trajectory] : estimates_of(data)) {
+    options.breaks = breaks_of(data, estimate);
     const auto pairs = associate_fixes(trajectory, fixes, data.antenna_position_base_m);
     auto& result =
         block.evaluations.emplace_back(evaluate_pairs(pairs, ReferenceKind::kPositions, options));
@@ -160,8 +186,8 @@ std::string print_step(const SessionData& data) {
   if (data.fused.size() < 2) {
     return "";
   }
-  const auto step =
-      data.lio.empty() ? largest_step(data.fused) : largest_step(data.fused, data.lio);
+  const auto step = data.lio.empty() ? largest_step(data.fused, data.run_begins())
+                                     : largest_step(data.fused, data.lio, data.odom_begins());
   const std::size_t unjudged = data.fused.size() - 1 - step.intervals;
   return "Largest step of " + std::string(file::kFused) +
          (step.relative_to_lio ? " (its change minus that of lio.tum over the same interval): "
@@ -169,9 +195,11 @@ std::string print_step(const SessionData& data) {
          fixed(step.distance_m, 3) + " m, " + fixed(step.rotation_deg, 2) + " deg at " +
          exporter::stamp_text(step.stamp_ns) + ", of " + std::to_string(step.intervals) +
          " intervals" +
-         (unjudged == 0 ? ""
-                        : "; " + std::to_string(unjudged) +
-                              " more are not judged, since lio.tum has no pose near them") +
+         (unjudged == 0
+              ? ""
+              : "; " + std::to_string(unjudged) +
+                    " more are not judged, since lio.tum has no pose near them" +
+                    (data.odom_begins().empty() ? "" : " or odom or the run began anew")) +
          ".\n";
 }
 
@@ -220,7 +248,7 @@ std::string print_scores(const SessionData& data, const std::vector<ScoreBlock>&
         "There is nothing to measure against: no truth.tum that could be used, and no fixes with a "
         "datum.\n\n";
   }
-  return text + print_step(data);
+  return print_runs_without_truth(data) + text + print_step(data);
 }
 
 }  // namespace trigpoint::evaluation

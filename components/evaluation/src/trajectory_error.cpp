@@ -67,10 +67,12 @@ std::optional<Pose> align_se3(const Points& estimate, const Points& reference) {
 }
 
 /// [3]: distances along the reference from the first pair.
-std::vector<double> distances_along(const std::vector<PosePair>& pairs) {
+std::vector<double> distances_along(const std::vector<PosePair>& pairs, const Breaks& breaks) {
   std::vector<double> distances(pairs.size(), 0.0);
   for (std::size_t i = 1; i < pairs.size(); ++i) {
-    distances[i] = distances[i - 1] + (pairs[i].reference.p - pairs[i - 1].reference.p).norm();
+    const bool driven = !is_between(breaks, pairs[i - 1].stamp_ns, pairs[i].stamp_ns);
+    distances[i] = distances[i - 1] +
+                   (driven ? (pairs[i].reference.p - pairs[i - 1].reference.p).norm() : 0.0);
   }
   return distances;
 }
@@ -87,10 +89,11 @@ using SegmentError = std::function<Eigen::Vector2d(const PosePair& from, const P
 /// `error` returns metres and degrees of one segment.
 RelativeError mean_over_segments(const std::vector<PosePair>& pairs,
                                  double length_m,
+                                 const Breaks& breaks,
                                  const SegmentError& error) {
   RelativeError result;
   result.length_m = length_m;
-  const auto distances = distances_along(pairs);
+  const auto distances = distances_along(pairs, breaks);
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   std::size_t to = 0;
   for (std::size_t from = 0; from < pairs.size(); ++from) {
@@ -99,6 +102,9 @@ RelativeError mean_over_segments(const std::vector<PosePair>& pairs,
     }
     if (to == pairs.size()) {
       break;
+    }
+    if (is_between(breaks, pairs[from].stamp_ns, pairs[to].stamp_ns)) {
+      continue;
     }
     sum += error(pairs[from], pairs[to]);
     ++result.segments;
@@ -208,22 +214,33 @@ AbsoluteError absolute_error(const std::vector<PosePair>& pairs) {
   return result;
 }
 
-RelativeError relative_error(const std::vector<PosePair>& pairs, double length_m) {
-  return mean_over_segments(pairs, length_m, [](const PosePair& from, const PosePair& to) {
-    const Pose error = motion_error(from, to);
-    return Eigen::Vector2d(error.p.norm(), angle_deg(error.q));
-  });
+bool is_between(const Breaks& breaks, Nanoseconds before_ns, Nanoseconds after_ns) {
+  const auto next = std::upper_bound(breaks.begin(), breaks.end(), before_ns);
+  return next != breaks.end() && *next <= after_ns;
 }
 
-RelativeError relative_position_error(const std::vector<PosePair>& aligned_pairs, double length_m) {
-  return mean_over_segments(aligned_pairs, length_m, [](const PosePair& from, const PosePair& to) {
+RelativeError relative_error(const std::vector<PosePair>& pairs,
+                             double length_m,
+                             const Breaks& breaks) {
+  const auto error_of = [](const PosePair& from, const PosePair& to) {
+    const Pose error = motion_error(from, to);
+    return Eigen::Vector2d(error.p.norm(), angle_deg(error.q));
+  };
+  return mean_over_segments(pairs, length_m, breaks, error_of);
+}
+
+RelativeError relative_position_error(const std::vector<PosePair>& aligned_pairs,
+                                      double length_m,
+                                      const Breaks& breaks) {
+  const auto error_of = [](const PosePair& from, const PosePair& to) {
     const Eigen::Vector3d reference = to.reference.p - from.reference.p;
     const Eigen::Vector3d estimate = to.estimate.p - from.estimate.p;
     return Eigen::Vector2d((estimate - reference).norm(), kNaN);
-  });
+  };
+  return mean_over_segments(aligned_pairs, length_m, breaks, error_of);
 }
 
-EndToEnd end_to_end(const std::vector<PosePair>& pairs) {
+EndToEnd end_to_end(const std::vector<PosePair>& pairs, const Breaks& breaks) {
   if (pairs.size() < 2) {
     return {};
   }
@@ -231,17 +248,19 @@ EndToEnd end_to_end(const std::vector<PosePair>& pairs) {
   EndToEnd result;
   result.error_m = error.p.norm();
   result.error_deg = angle_deg(error.q);
-  result.distance_m = distances_along(pairs).back();
+  result.distance_m = distances_along(pairs, breaks).back();
   if (result.distance_m > 0.0) {
     result.percent = 100.0 * result.error_m / result.distance_m;
   }
   return result;
 }
 
-double length_of(const Trajectory& trajectory) {
+double length_of(const Trajectory& trajectory, const Breaks& breaks) {
   double length_m = 0.0;
   for (std::size_t i = 1; i < trajectory.size(); ++i) {
-    length_m += (trajectory[i].pose.p - trajectory[i - 1].pose.p).norm();
+    if (!is_between(breaks, trajectory[i - 1].stamp_ns, trajectory[i].stamp_ns)) {
+      length_m += (trajectory[i].pose.p - trajectory[i - 1].pose.p).norm();
+    }
   }
   return length_m;
 }

@@ -14,6 +14,7 @@ namespace {
 const std::string kFixHeader =
     "stamp_ns,receive_ns,latitude_deg,longitude_deg,altitude_m,sigma_e_m,sigma_n_m,sigma_u_m,"
     "status,withheld";
+const std::string kSweepHeader = "stamp_ns,receive_ns,arrival_ns";
 const std::string kGateHeader =
     "stamp_ns,mode,verdict_fix_stamp_ns,verdict_used,verdict_reason,"
     "e_source,e_sigma_m,e_threshold_m,e_reason,"
@@ -52,6 +53,11 @@ double variance_of(double sigma) {
   return sigma * sigma;
 }
 
+/// The placeholder of what nobody knows is no figure.
+double known_or_nan(double sigma) {
+  return variance_of(sigma) < kUnknownVariance ? sigma : kNaN;
+}
+
 std::string gate_line(const FusionStatus& status, const FixVerdict& verdict) {
   CsvLine line;
   line.add(status.stamp_ns).add(status.mode);
@@ -63,9 +69,9 @@ std::string gate_line(const FusionStatus& status, const FixVerdict& verdict) {
   line.add(status.aligned).add(status.T_map_odom.yaw_rad);
   line.add(status.T_map_odom.p.x()).add(status.T_map_odom.p.y()).add(status.T_map_odom.p.z());
   line.add(status.T_map_odom.tilt_rad.x()).add(status.T_map_odom.tilt_rad.y());
-  line.add(status.yaw_sigma_rad);
+  line.add(known_or_nan(status.yaw_sigma_rad));
   for (const double sigma_m : status.position_sigma_m) {
-    line.add(sigma_m);
+    line.add(known_or_nan(sigma_m));
   }
   line.add(status.fixes_seen).add(status.fixes_used);
   line.add(join_counts(status.verdicts)).add(status.gps_source);
@@ -111,6 +117,28 @@ std::vector<LoggedFix> read_fixes(const std::string& file) {
     withheld = cells.flag();
   });
   return fixes;
+}
+
+SweepLog::SweepLog(const std::string& file, Opening opening)
+    : lines_(std::make_unique<LineFile>(file, kSweepHeader + "\n", opening)) {}
+
+SweepLog::~SweepLog() = default;
+
+void SweepLog::append(const LoggedSweep& sweep) {
+  CsvLine line;
+  line.add(sweep.stamp_ns).add(sweep.receive_ns).add(sweep.arrival_ns);
+  lines_->append(line.str());
+}
+
+std::vector<LoggedSweep> read_sweeps(const std::string& file) {
+  std::vector<LoggedSweep> sweeps;
+  read_csv(file, kSweepHeader, [&](CsvCells& cells) {
+    auto& sweep = sweeps.emplace_back();
+    sweep.stamp_ns = cells.integer();
+    sweep.receive_ns = cells.integer();
+    sweep.arrival_ns = cells.integer();
+  });
+  return sweeps;
 }
 
 GateLog::GateLog(const std::string& file, Opening opening)

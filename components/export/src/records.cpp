@@ -47,9 +47,12 @@ class Record {
     } catch (const YAML::Exception& error) {
       throw std::runtime_error(file + ": not valid YAML: " + error.what());
     }
-    if (!node_.IsMap() && !node_.IsNull()) {
-      throw std::runtime_error(file + ": expected `key: value` lines");
-    }
+    require_lines();
+  }
+
+  /// A part of the file that has lines of its own.
+  Record(const std::string& file, const YAML::Node& node) : file_(file), node_(node) {
+    require_lines();
   }
 
   template <typename Value>
@@ -86,6 +89,12 @@ class Record {
   }
 
  private:
+  void require_lines() const {
+    if (!node_.IsMap() && !node_.IsNull()) {
+      throw std::runtime_error(file_ + ": expected `key: value` lines");
+    }
+  }
+
   std::string file_;
   YAML::Node node_;
 };
@@ -158,6 +167,10 @@ Datum read_datum(const std::string& file) {
   return datum;
 }
 
+bool is_known(const Alignment& alignment) {
+  return (alignment.covariance.diagonal().array() < kUnknownVariance).all();
+}
+
 void write_alignment(const std::string& file, const AlignmentRecord& record) {
   const YawPose& T_map_odom = record.alignment.T_map_odom;
   const Eigen::Matrix4d& covariance = record.alignment.covariance;
@@ -171,10 +184,12 @@ void write_alignment(const std::string& file, const AlignmentRecord& record) {
           number_text(T_map_odom.tilt_rad.y()) + "]";
   for (int i = 0; i < 4; ++i) {
     text += std::string("\n") + kAlignmentAxes[static_cast<std::size_t>(i)] +
-            (i == 0 ? "_sigma_rad: " : "_sigma_m: ") + number_text(std::sqrt(covariance(i, i)));
+            (i == 0 ? "_sigma_rad: " : "_sigma_m: ") +
+            number_text(covariance(i, i) < kUnknownVariance ? std::sqrt(covariance(i, i)) : kNaN);
   }
   text += "\n# rows of yaw, x, y, z\ncovariance: " + covariance_text(covariance);
   text += std::string("\nadmitted: ") + (record.admitted ? "true" : "false");
+  text += record.was_admitted ? "\nwas_admitted: true" : "";
   text += "\ncomment: " + quoted(record.comment) + "\n";
   write_text(file, text);
 }
@@ -193,6 +208,7 @@ AlignmentRecord read_alignment(const std::string& file) {
     result.alignment.covariance(i / 4, i % 4) = covariance[static_cast<std::size_t>(i)];
   }
   result.admitted = record.get<bool>("admitted");
+  result.was_admitted = record.node()["was_admitted"] && record.get<bool>("was_admitted");
   result.comment = record.get<std::string>("comment");
   return result;
 }
@@ -224,16 +240,25 @@ std::optional<Datum> datum_named_in(const std::string& trajectory_file) {
   return std::nullopt;
 }
 
-void write_run(const std::string& file, const RunInfo& run) {
-  write_text(file,
-             "log: " + quoted(run.log) + "\nhow: " + quoted(run.how) +
-                 "\nmode: " + quoted(run.mode) + "\ngps_filter: " + quoted(run.gps_filter) +
-                 "\ndata_s: " + number_text(run.data_s) + "\nwall_s: " + number_text(run.wall_s) +
-                 "\n" + (run.interrupted ? "interrupted: true\n" : ""));
+namespace {
+
+/// Lines of `key: value`, each after `indent`.
+std::string run_text(const RunInfo& run, const std::string& indent) {
+  const auto line = [&](const std::string& key, const std::string& value) {
+    return indent + key + ": " + value + "\n";
+  };
+  std::string text = line("log", quoted(run.log)) + line("how", quoted(run.how)) +
+                     line("mode", quoted(run.mode)) + line("gps_filter", quoted(run.gps_filter)) +
+                     line("data_s", number_text(run.data_s)) +
+                     line("wall_s", number_text(run.wall_s));
+  if (run.begin_ns != 0) {
+    text +=
+        line("begin_ns", std::to_string(run.begin_ns)) + line("end_ns", std::to_string(run.end_ns));
+  }
+  return text + (run.interrupted ? line("interrupted", "true") : "");
 }
 
-RunInfo read_run(const std::string& file) {
-  const Record record(file);
+RunInfo run_of(const Record& record) {
   RunInfo run;
   run.log = record.get<std::string>("log");
   run.how = record.get<std::string>("how");
@@ -242,7 +267,47 @@ RunInfo read_run(const std::string& file) {
   run.data_s = record.get<double>("data_s");
   run.wall_s = record.get<double>("wall_s");
   run.interrupted = record.node()["interrupted"] && record.get<bool>("interrupted");
+  if (record.node()["begin_ns"]) {
+    run.begin_ns = record.get<Nanoseconds>("begin_ns");
+    run.end_ns = record.get<Nanoseconds>("end_ns");
+  }
   return run;
+}
+
+}  // namespace
+
+void write_run(const std::string& file, const RunInfo& run) {
+  std::string text = run_text(run, "");
+  text += run.before.empty() ? "" : "before:\n";
+  for (const RunInfo& earlier : run.before) {
+    std::string item = run_text(earlier, "    ");
+    text += item.replace(2, 1, "-");
+  }
+  write_text(file, text);
+}
+
+RunInfo read_run(const std::string& file) {
+  const Record record(file);
+  RunInfo run = run_of(record);
+  for (const auto& earlier : record.node()["before"]) {
+    run.before.push_back(run_of(Record(file, earlier)));
+  }
+  return run;
+}
+
+std::vector<RunInfo> runs_in(const std::string& session) {
+  const std::string file = path_in(session, session_file::kRun);
+  if (!fs::exists(file)) {
+    RunInfo unknown;
+    unknown.log = "not recorded";
+    return fs::exists(path_in(session, session_file::kLio)) ? std::vector{unknown}
+                                                            : std::vector<RunInfo>{};
+  }
+  RunInfo newest = read_run(file);
+  std::vector<RunInfo> runs = std::move(newest.before);
+  newest.before.clear();
+  runs.push_back(std::move(newest));
+  return runs;
 }
 
 CountsWriter::CountsWriter(const std::string& folder, const std::string& program, Opening opening)

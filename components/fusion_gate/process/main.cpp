@@ -148,6 +148,7 @@ class Process {
 
   void take(const LioStatus& status) {
     mapper_aligned_ = status.aligned;
+    mapper_heard_ = true;
     take(core_.on_lio_status(status));
   }
 
@@ -206,8 +207,9 @@ class Process {
   }
 
   void record_alignment() {
-    if (const auto alignment = core_.best_alignment()) {
-      keep([&] { session_->on_alignment(*alignment, mapper_aligned_); });
+    const auto best = core_.best_alignment();
+    if (best || mapper_heard_) {  // a gate that has just begun knows nothing of what is in force
+      keep([&] { session_->on_alignment(best, mapper_aligned_); });
     }
   }
 
@@ -224,6 +226,7 @@ class Process {
   std::optional<pipeline::GatePart> session_;
   FusionStatus last_;
   bool mapper_aligned_{false};
+  bool mapper_heard_{false};
   std::string published_datum_;
   bus::Participant participant_;
   bus::Publisher<trigpoint_msgs::msg::StateUpdate> updates_;

@@ -2,6 +2,8 @@
 // Copyright the Trigpoint developers
 #include "trigpoint/pipeline/session_parts.hpp"
 
+#include <filesystem>
+
 namespace trigpoint::pipeline {
 
 namespace file = exporter::session_file;
@@ -17,7 +19,12 @@ GatePart::GatePart(const std::string& session, exporter::Opening opening)
     : session_(session),
       trajectory_(path_in(session, file::kFused), "base_link in map, as published online", opening),
       gate_log_(path_in(session, file::kGate), opening),
-      counts_(session, "fusion_gate", opening) {}
+      counts_(session, "fusion_gate", opening) {
+  const std::string alignment = path_in(session, file::kAlignment);
+  if (opening == exporter::Opening::kContinue && std::filesystem::exists(alignment)) {
+    newest_alignment_ = written_alignment_ = exporter::read_alignment(alignment);
+  }
+}
 
 void GatePart::on_fused(const Odometry& odometry) {
   trajectory_.append(odometry.stamp_ns, odometry.T_frame_child);
@@ -28,9 +35,24 @@ void GatePart::on_status(const FusionStatus& status) {
   last_ = status;
 }
 
-void GatePart::on_alignment(const Alignment& alignment, bool admitted) {
-  newest_alignment_ = {alignment, admitted, admitted ? "" : "not admitted by the gate"};
-  const bool new_verdict = !written_alignment_ || written_alignment_->admitted != admitted;
+void GatePart::on_alignment(const std::optional<Alignment>& best, bool admitted) {
+  const bool was_admitted =
+      newest_alignment_ && (newest_alignment_->admitted || newest_alignment_->was_admitted);
+  if (best && exporter::is_known(*best)) {
+    newest_alignment_ = {
+        *best, admitted, admitted ? "" : "not admitted by the gate", was_admitted && !admitted};
+  } else if (newest_alignment_ && newest_alignment_->admitted) {
+    newest_alignment_->admitted = false;
+    newest_alignment_->was_admitted = true;
+    newest_alignment_->comment =
+        best ? "not admitted any more: the mapper has not found its place in the map again"
+             : "not admitted any more: odom began anew and has not been aligned since";
+  }
+  if (!newest_alignment_) {
+    return;
+  }
+  const bool new_verdict =
+      !written_alignment_ || written_alignment_->admitted != newest_alignment_->admitted;
   const bool due = to_seconds(last_.stamp_ns - written_ns_) >= kRewriteAfter_s;
   if (new_verdict ||
       (due && exporter::differs_substantially(*newest_alignment_, *written_alignment_))) {

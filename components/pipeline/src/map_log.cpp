@@ -76,6 +76,9 @@ class MapRun {
         withholding_(options.withhold) {
     resume();
     exporter::create_session_folder(options_.session);
+    if (options_.use == UseOfStored::kResume) {
+      before_ = exporter::runs_in(options_.session);
+    }
     session_.emplace(options_.session, options_.use);
     session_->correct_past_of(cores_, options_.use);
     exporter::write_text(session_->path(file::kConfig), options_.config_text);
@@ -89,6 +92,10 @@ class MapRun {
       entry.withheld = withholding_.withholds(fix->stamp_ns) || entry.withheld;
     }
     session_->on_entry(entry);
+    if (const Nanoseconds begin_ns = session_->log().begin_ns(); begin_ns != begin_ns_) {
+      begin_ns_ = begin_ns;
+      write_run();  // so that one that is killed says where it begins
+    }
     advance([&] { return cloud ? cores_.step(entry, std::move(*cloud)) : cores_.step(entry); });
   }
 
@@ -138,7 +145,10 @@ class MapRun {
                          filter_,
                          result_.data_s,
                          result_.wall_s,
-                         result_.stopped});
+                         result_.stopped,
+                         begin_ns_,
+                         session_->log().end_ns(),
+                         before_});
   }
 
   MapLogOptions options_;
@@ -147,6 +157,8 @@ class MapRun {
   Lockstep cores_;
   recording::FixWithholding withholding_;
   std::optional<OfflineSession> session_;
+  std::vector<exporter::RunInfo> before_;  ///< of a session that goes on
+  Nanoseconds begin_ns_{0};                ///< of the IMU's first stamp
   Clock::time_point start_;
   MapLogResult result_;
 };

@@ -97,11 +97,9 @@ void OfflineSession::keep_datum(const Lockstep& cores) {
 }
 
 void OfflineSession::keep_alignment(const Lockstep& cores) {
-  if (const auto alignment = cores.best_alignment()) {
-    disk_.give([this, alignment, aligned = cores.lio_status().aligned] {
-      gate_.on_alignment(*alignment, aligned);
-    });
-  }
+  disk_.give([this, best = cores.best_alignment(), aligned = cores.lio_status().aligned] {
+    gate_.on_alignment(best, aligned);
+  });
 }
 
 }  // namespace trigpoint::pipeline

@@ -213,6 +213,7 @@ TEST(AlignmentRecord, returns_yaw_translation_and_covariance) {
   record.alignment.covariance.diagonal() = Eigen::Vector4d(1e-4, 0.01, 0.04, 0.09);
   record.alignment.covariance(0, 2) = 1e-3;
   record.comment = "yaw sigma 0.6 deg: limit is 0.5";
+  record.was_admitted = true;
   write_alignment(folder.file("alignment.yaml"), record);
   const auto read = read_alignment(folder.file("alignment.yaml"));
   EXPECT_EQ(read.alignment.odom_epoch, 3U);
@@ -220,6 +221,7 @@ TEST(AlignmentRecord, returns_yaw_translation_and_covariance) {
   EXPECT_EQ(read.alignment.T_map_odom.p, record.alignment.T_map_odom.p);
   EXPECT_EQ(read.alignment.covariance, record.alignment.covariance);
   EXPECT_FALSE(read.admitted);
+  EXPECT_TRUE(read.was_admitted);
   EXPECT_EQ(read.comment, record.comment);
 }
 
@@ -231,6 +233,66 @@ TEST(RunInfo, keeps_paths_with_quotes_and_colons) {
   EXPECT_EQ(read.log, run.log);
   EXPECT_EQ(read.data_s, 120.5);
   EXPECT_EQ(read.wall_s, 30.25);
+}
+
+TEST(RunInfo, keeps_what_was_run_before_the_session_was_resumed) {
+  const ScratchFolder folder;
+  RunInfo first{"day one", "offline", "smooth", "eskf18", 40.0, 4.0};
+  first.begin_ns = 1'700'000'000'000'000'001;
+  first.end_ns = 1'700'000'040'000'000'000;
+  write_run(folder.file("run.yaml"), first);
+  RunInfo second{"day: \"two\"", "offline", "hard", "ekf15", 30.0, 3.0};
+  second.before = runs_in(folder.path());
+  write_run(folder.file("run.yaml"), second);
+  RunInfo third{"day three", "offline", "hard", "ekf15", 20.0, 2.0};
+  third.before = runs_in(folder.path());
+  write_run(folder.file("run.yaml"), third);
+  const auto runs = runs_in(folder.path());
+  ASSERT_EQ(runs.size(), 3U);
+  EXPECT_EQ(runs[0].log, "day one");
+  EXPECT_EQ(runs[0].begin_ns, first.begin_ns);
+  EXPECT_EQ(runs[0].end_ns, first.end_ns);
+  EXPECT_EQ(runs[1].log, second.log);
+  EXPECT_EQ(runs[1].begin_ns, 0);
+  EXPECT_EQ(runs[2].data_s, 20.0);
+  EXPECT_EQ(read_run(folder.file("run.yaml")).before.size(), 2U);
+}
+
+TEST(RunInfo, knows_a_session_whose_programs_wrote_none) {
+  const ScratchFolder folder;
+  EXPECT_TRUE(runs_in(folder.path()).empty());
+  write_all(folder.file("lio.tum"), "");
+  ASSERT_EQ(runs_in(folder.path()).size(), 1U);
+  EXPECT_EQ(runs_in(folder.path()).front().log, "not recorded");
+}
+
+TEST(SweepLog, returns_what_was_appended_and_goes_on) {
+  const ScratchFolder folder;
+  SweepLog(folder.file("sweeps.csv")).append({1'700'000'000'013'000'000, 5, 6});
+  SweepLog(folder.file("sweeps.csv"), Opening::kContinue).append({2, 3, 4});
+  const auto sweeps = read_sweeps(folder.file("sweeps.csv"));
+  ASSERT_EQ(sweeps.size(), 2U);
+  EXPECT_EQ(sweeps[0].stamp_ns, 1'700'000'000'013'000'000);
+  EXPECT_EQ(sweeps[0].receive_ns, 5);
+  EXPECT_EQ(sweeps[1].arrival_ns, 4);
+}
+
+/// 1000 rad and m stand for what nobody knows.
+TEST(Session, holds_no_placeholder_of_a_sigma_for_a_figure) {
+  const ScratchFolder folder;
+  EXPECT_FALSE(is_known(Alignment{}));
+  write_alignment(folder.file("alignment.yaml"), {});
+  const std::string alignment = read_all(folder.file("alignment.yaml"));
+  EXPECT_THAT(alignment, HasSubstr("yaw_sigma_rad: nan\nx_sigma_m: nan"));
+  FusionStatus status;
+  status.aligned = true;
+  status.yaw_sigma_rad = 1000.0;
+  status.position_sigma_m = {1000.0, 0.25, 1000.0};
+  GateLog(folder.file("gate.csv")).append(status);
+  const auto row = read_gate_log(folder.file("gate.csv")).front();
+  EXPECT_TRUE(std::isnan(row.yaw_sigma_rad));
+  EXPECT_TRUE(std::isnan(row.position_sigma_m[0]));
+  EXPECT_EQ(row.position_sigma_m[1], 0.25);
 }
 
 TEST(Counts, are_replaced_whole_and_may_be_none) {

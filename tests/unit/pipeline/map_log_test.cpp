@@ -3,7 +3,6 @@
 #include "trigpoint/pipeline/map_log.hpp"
 
 #include "trigpoint/export/session.hpp"
-#include "trigpoint/pipeline/session_parts.hpp"
 
 #include "../export/scratch_folder.hpp"
 #include "stored_log.hpp"
@@ -262,26 +261,6 @@ TEST(MapLog, notes_that_it_was_interrupted) {
   EXPECT_TRUE(exporter::read_run(folder.file("run.yaml")).interrupted);
   run(folder.path(), stored_drive().entries);
   EXPECT_FALSE(exporter::read_run(folder.file("run.yaml")).interrupted);
-}
-
-TEST(GatePart, rewrites_the_alignment_when_it_moves_and_not_at_every_status) {
-  const ScratchFolder folder;
-  GatePart part(folder.path());
-  const auto at = [&](double now_s, double x_m, bool admitted) {
-    FusionStatus status;
-    status.stamp_ns = from_seconds(now_s);
-    part.on_status(status);
-    Alignment alignment;
-    alignment.T_map_odom.p.x() = x_m;
-    part.on_alignment(alignment, admitted);
-    return exporter::read_alignment(folder.file("alignment.yaml")).alignment.T_map_odom.p.x();
-  };
-  EXPECT_EQ(at(100.0, 1.0, false), 1.0);
-  EXPECT_EQ(at(101.0, 2.0, false), 1.0);   // too soon
-  EXPECT_EQ(at(101.2, 2.0, true), 2.0);    // admitted: at once
-  EXPECT_EQ(at(110.0, 2.001, true), 2.0);  // nothing new
-  EXPECT_EQ(at(111.0, 2.5, true), 2.5);
-  part.close();
 }
 
 }  // namespace

@@ -202,6 +202,14 @@ TEST(MapLogResume, appends_to_the_session_and_goes_on_counting) {
   EXPECT_GT(after.checkpoint.stamp_ns, before.checkpoint.stamp_ns);
   EXPECT_GT(keyframes_in(folder.path()), keyframes);
   EXPECT_GT(exporter::read_trajectory(folder.file("lio.tum")).size(), poses + 15);
+
+  const std::vector<exporter::RunInfo> runs = exporter::runs_in(folder.path());
+  ASSERT_EQ(runs.size(), 2U);
+  EXPECT_EQ(runs[0].log, "stored");
+  EXPECT_LT(runs[0].end_ns, runs[1].begin_ns);
+  EXPECT_NEAR(to_seconds(runs[1].begin_ns - runs[0].begin_ns), 4.5, 0.02);
+  EXPECT_EQ(exporter::read_sweeps(folder.file("sweeps.csv")).size(),
+            exporter::read_trajectory(folder.file("lio.tum")).size());
 }
 
 PlaceTrial try_later_entries(const StoredSession& stored, double to_s = 7.0) {

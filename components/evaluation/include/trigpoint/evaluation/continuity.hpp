@@ -20,7 +20,8 @@ struct Step {
 
 /// Largest of |p_fused(k+1) - T_map_odom(k) p_lio(k+1)| with T_map_odom(k) = fused(k) lio(k)^-1:
 /// the change of what is published minus the change of odom over the same interval, at base_link.
-Step largest_step(const Trajectory& fused, const Trajectory& lio);
+/// Intervals with a break in them are not looked at.
+Step largest_step(const Trajectory& fused, const Trajectory& lio, const Breaks& breaks = {});
 
 /// The same over `interval_ns` instead of between consecutive poses: from each pose to the first
 /// one that is no less than the interval later (and less than twice of it). The frames are those of
@@ -28,8 +29,8 @@ Step largest_step(const Trajectory& fused, const Trajectory& lio);
 /// lio/odometry_imu_rate have.
 Step largest_step_over(const Trajectory& fused, const Trajectory& odom, Nanoseconds interval_ns);
 
-/// Largest plain change of position between consecutive poses.
-Step largest_step(const Trajectory& trajectory);
+/// Largest plain change of position between consecutive poses without a break between them.
+Step largest_step(const Trajectory& trajectory, const Breaks& breaks = {});
 
 struct Window {
   Nanoseconds begin_ns{0};

@@ -41,6 +41,7 @@ struct EvaluationOptions {
   Nanoseconds largest_gap_ns{kDefaultGap_ns};
   std::vector<Window> outages;     ///< none: the whole is `good` and is not told apart
   const Trajectory* lio{nullptr};  ///< to judge steps against; not owned
+  Breaks breaks{};                 ///< over which nothing was driven
 };
 
 /// Scores `pairs` (already associated). Without pairs every number is NaN.

@@ -95,8 +95,15 @@ struct AbsoluteError {
 
 AbsoluteError absolute_error(const std::vector<PosePair>& pairs);
 
+/// Moments at which something begins that does not go on from what was before: another drive of a
+/// session that was resumed, another odom epoch. What is between two poses with one of these after
+/// the first and not after the second was not driven. In order of time.
+using Breaks = std::vector<Nanoseconds>;
+
+bool is_between(const Breaks& breaks, Nanoseconds before_ns, Nanoseconds after_ns);
+
 /// Mean over all segments whose length along the reference is the first that reaches `length_m`,
-/// one from each pose ([3] starts at every tenth).
+/// one from each pose ([3] starts at every tenth). No segment goes over a break.
 struct RelativeError {
   double length_m{0.0};
   std::size_t segments{0};  ///< 0: the drive is shorter, the numbers are NaN
@@ -104,23 +111,27 @@ struct RelativeError {
   double rotation_deg_per_m{kNaN};
 };
 
-RelativeError relative_error(const std::vector<PosePair>& pairs, double length_m);
+RelativeError relative_error(const std::vector<PosePair>& pairs,
+                             double length_m,
+                             const Breaks& breaks = {});
 
 /// The same for positions only (a reference without attitude): |change of the aligned estimate -
 /// change of the reference| over the segment; rotation is NaN.
-RelativeError relative_position_error(const std::vector<PosePair>& aligned_pairs, double length_m);
+RelativeError relative_position_error(const std::vector<PosePair>& aligned_pairs,
+                                      double length_m,
+                                      const Breaks& breaks = {});
 
 /// The motion from the first to the last pair, seen by the estimate against the reference.
 struct EndToEnd {
   double error_m{kNaN};
   double error_deg{kNaN};
-  double distance_m{kNaN};  ///< along the reference
+  double distance_m{kNaN};  ///< along the reference, without what lies over breaks
   double percent{kNaN};     ///< error over distance
 };
 
-EndToEnd end_to_end(const std::vector<PosePair>& pairs);
+EndToEnd end_to_end(const std::vector<PosePair>& pairs, const Breaks& breaks = {});
 
-/// Sum of the distances between consecutive poses.
-double length_of(const Trajectory& trajectory);
+/// Sum of the distances between consecutive poses without a break between them.
+double length_of(const Trajectory& trajectory, const Breaks& breaks = {});
 
 }  // namespace trigpoint::evaluation

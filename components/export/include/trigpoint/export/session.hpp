@@ -34,6 +34,7 @@ inline constexpr const char* kFixes = "fixes.csv";
 inline constexpr const char* kGate = "gate.csv";
 inline constexpr const char* kGpsStatus = "gps_status.csv";
 inline constexpr const char* kScans = "scans.csv";
+inline constexpr const char* kSweeps = "sweeps.csv";
 inline constexpr const char* kKeyframes = "keyframes.sqlite";
 inline constexpr const char* kKeyframePoses = "keyframes.tum";  ///< corrected
 inline constexpr const char* kMap = "map.pcd";
@@ -111,6 +112,28 @@ struct LoggedFix {
 
 std::vector<LoggedFix> read_fixes(const std::string& file);
 
+/// A sweep of the log, as it was handed on: to the cores, or published.
+struct LoggedSweep {
+  Nanoseconds stamp_ns{0};    ///< of its message
+  Nanoseconds receive_ns{0};  ///< when the log had it
+  /// The same moment on the clock of the IMU's stamps, which the estimates have too: the LiDAR's
+  /// own may be another one, or be set while it drives.
+  Nanoseconds arrival_ns{0};
+};
+
+/// sweeps.csv: every sweep of the log, answered or not.
+class SweepLog {
+ public:
+  explicit SweepLog(const std::string& file, Opening opening = Opening::kFresh);
+  ~SweepLog();
+  void append(const LoggedSweep& sweep);
+
+ private:
+  std::unique_ptr<LineFile> lines_;
+};
+
+std::vector<LoggedSweep> read_sweeps(const std::string& file);
+
 /// gate.csv: a row per FusionStatus, and before it one for each further verdict that it tells.
 class GateLog {
  public:
@@ -163,8 +186,12 @@ Datum read_datum(const std::string& file);
 struct AlignmentRecord {
   Alignment alignment;
   bool admitted{false};
-  std::string comment;  ///< e.g. why it is not admitted
+  std::string comment;       ///< e.g. why it is not admitted
+  bool was_admitted{false};  ///< it, or that of an odom epoch before, and is not any more
 };
+
+/// False when the covariance is the placeholder of what nobody knows (kUnknownVariance).
+bool is_known(const Alignment& alignment);
 
 /// Whether `next` tells a reader something that `written` does not: another epoch or verdict, or a
 /// map that lies visibly elsewhere.
@@ -186,10 +213,20 @@ struct RunInfo {
   double data_s{0.0};       ///< duration of the log
   double wall_s{0.0};       ///< processing time
   bool interrupted{false};  ///< by the user: what was in flight then is missing
+  /// Stamps of the first and the last IMU sample of the log, as used; 0: none, or not known.
+  Nanoseconds begin_ns{0};
+  Nanoseconds end_ns{0};
+  /// What the session held already when it was resumed, oldest first; they have none themselves.
+  std::vector<RunInfo> before{};
 };
 
 void write_run(const std::string& file, const RunInfo& run);
 RunInfo read_run(const std::string& file);
+
+/// What a session that goes on has been so far, oldest first: its run.yaml and what that has as
+/// `before`. A session without run.yaml was run by programs that write none; empty for an empty
+/// folder.
+std::vector<RunInfo> runs_in(const std::string& session);
 
 /// <program>.counts.yaml: `name: number` lines, replaced whole at each write. Names are
 /// `<stream>.<what>[.<reason>]`, stream one of points, imu, fix; what one of in_log, published,

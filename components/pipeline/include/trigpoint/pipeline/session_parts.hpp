@@ -81,14 +81,17 @@ class MapperPart {
 /// fused.tum, gate.csv, alignment.yaml and the gate's counts.
 class GatePart {
  public:
+  /// Goes on (`Opening::kContinue`) from the alignment that the session has.
   explicit GatePart(const std::string& session,
                     exporter::Opening opening = exporter::Opening::kFresh);
   void on_fused(const Odometry& odometry);
   void on_status(const FusionStatus& status);
-  /// The best alignment so far. Written when it tells something new, and then at most every few
-  /// seconds of data time (the newest status's) unless the gate's verdict on it changed; cheap
-  /// enough for every status.
-  void on_alignment(const Alignment& alignment, bool admitted);
+  /// The best alignment at this moment, and whether the mapper has taken it. Without one, or with
+  /// one of which nobody knows how good it is (a mapper that looks for its place in the map), the
+  /// last one is kept and is not admitted any more. Written when it tells something new, and then
+  /// at most every few seconds of data time (the newest status's) unless the gate's verdict on it
+  /// changed; cheap enough for every status.
+  void on_alignment(const std::optional<Alignment>& best, bool admitted);
   /// Cheap enough for once a second, so that a program that is killed leaves what it counted.
   void keep_counts();
   void close();
@@ -106,7 +109,7 @@ class GatePart {
   Nanoseconds written_ns_{0};
 };
 
-/// fixes.csv and the counts of what the log held and of what was handed on.
+/// fixes.csv, sweeps.csv, truth.tum and the counts of what the log held and of what was handed on.
 class LogPart {
  public:
   explicit LogPart(const std::string& session,
@@ -114,21 +117,40 @@ class LogPart {
   void on_entry(const recording::LogEntry& entry);
   /// `log` is what the entries came from; it knows what it passed over.
   void close(const recording::LogReader& log);
-  /// Copies the truth that lies beside the log, if any; for scoring only.
+  /// Copies the truth that lies beside the log, if any; for scoring only. A session that goes on
+  /// keeps the truth that it has, and what is later is appended: unless the two are in `map` at
+  /// different datums, since then the new one is in another frame.
   void keep_truth(const recording::LogReader& log) const;
 
   Nanoseconds first_ns() const { return first_ns_; }
 
   Nanoseconds last_ns() const { return last_ns_; }
 
+  /// Stamps of the first and the newest IMU sample; zero without one.
+  Nanoseconds begin_ns() const { return begin_ns_; }
+
+  Nanoseconds end_ns() const { return newest_imu_.stamp_ns; }
+
   std::uint64_t sweeps() const { return sweeps_; }
 
  private:
+  struct Moment {
+    Nanoseconds stamp_ns{0};
+    Nanoseconds receive_ns{0};
+  };
+
+  void on_imu(Moment sample);
+  void on_sweep(Moment sweep);
+
   std::string session_;
+  exporter::Opening opening_;
   exporter::FixLog fixes_;
+  exporter::SweepLog sweep_log_;
   exporter::CountsWriter counts_;
   Nanoseconds first_ns_{0};
   Nanoseconds last_ns_{0};
+  Nanoseconds begin_ns_{0};
+  Moment newest_imu_;
   std::uint64_t sweeps_{0};
   std::uint64_t imu_{0};
   std::uint64_t twists_{0};

@@ -1,0 +1,342 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "missed_scans.hpp"
+
+#include "session_data.hpp"
+#include "table.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace trigpoint::evaluation {
+
+namespace {
+
+namespace file = exporter::session_file;
+
+constexpr double kGapIntervals = 1.5;
+/// A sweep may seem to arrive this much before its last point: the IMU's newest sample is older.
+constexpr double kEarlyIntervals = 0.25;
+/// Sweeps this near to one that two scans fall on may be what one of them belongs to: arrivals
+/// jitter.
+constexpr std::ptrdiff_t kJitterSweeps = 2;
+/// A successor speaks within 3 s of the death of a mapper (docs/restart_and_replace.md).
+constexpr double kRestart_s = 3.0;
+/// Of a short drive less is considerable; but not what is always on its way at an end.
+constexpr double kConsiderableShare = 0.1;
+constexpr double kOnItsWay_s = 1.0;
+
+template <typename Value>
+Value median_of(std::vector<Value> values) {
+  if (values.empty()) {
+    return {};
+  }
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+Nanoseconds usual_interval_ns(const std::vector<exporter::LoggedSweep>& sweeps) {
+  std::vector<Nanoseconds> intervals;
+  for (std::size_t i = 1; i < sweeps.size(); ++i) {
+    intervals.push_back(sweeps[i].arrival_ns - sweeps[i - 1].arrival_ns);
+  }
+  return median_of(intervals);
+}
+
+/// Finds for every sweep the scan that came of it.
+class Answers {
+ public:
+  explicit Answers(const SweepsAndScans& there) : there_(there) {
+    std::vector<std::vector<std::size_t>> scans_of(there.sweeps.size());
+    const Nanoseconds delay_ns = usual_delay_ns();
+    for (std::size_t i = first_scan(); i < there.scans.size(); ++i) {
+      scans_of[nearest(stamp_ns(i) + delay_ns)].push_back(i);
+    }
+    share_out(scans_of);
+    for (const auto& scans : scans_of) {
+      scan_of_.push_back(scans.empty() ? std::nullopt : std::optional(scans.front()));
+    }
+  }
+
+  std::optional<std::size_t> scan_of(std::size_t sweep) const { return scan_of_[sweep]; }
+
+  Nanoseconds stamp_ns(std::size_t scan) const { return there_.scans[scan].status.stamp_ns; }
+
+  /// Scans before it are of drives whose sweeps nobody wrote down.
+  std::size_t first_scan() const {
+    const Nanoseconds begin_ns = there_.sweeps.front().arrival_ns - kNanosecondsPerSecond;
+    const auto first = std::lower_bound(
+        there_.scans.begin(),
+        there_.scans.end(),
+        begin_ns,
+        [](const auto& scan, Nanoseconds stamp_ns) { return scan.status.stamp_ns < stamp_ns; });
+    return static_cast<std::size_t>(first - there_.scans.begin());
+  }
+
+ private:
+  using Sweep = exporter::LoggedSweep;
+
+  std::vector<Sweep>::const_iterator not_before(Nanoseconds arrival_ns) const {
+    return std::lower_bound(
+        there_.sweeps.begin(), there_.sweeps.end(), arrival_ns, [](const Sweep& s, Nanoseconds at) {
+          return s.arrival_ns < at;
+        });
+  }
+
+  /// From a sweep's last point to its arrival: at most an interval, or a little more where the
+  /// first guess leaves more scans without a sweep.
+  Nanoseconds usual_delay_ns() const {
+    const Nanoseconds interval_ns = usual_interval_ns(there_.sweeps);
+    const auto early_ns =
+        static_cast<Nanoseconds>(kEarlyIntervals * static_cast<double>(interval_ns));
+    std::vector<Nanoseconds> delays;
+    for (std::size_t i = first_scan(); i < there_.scans.size(); ++i) {
+      const auto sweep = not_before(stamp_ns(i) - early_ns);
+      if (sweep != there_.sweeps.end()) {
+        delays.push_back(sweep->arrival_ns - stamp_ns(i));
+      }
+    }
+    const Nanoseconds guess_ns = median_of(delays);
+    const Nanoseconds later_ns = guess_ns + interval_ns;
+    return astray(later_ns, interval_ns) < astray(guess_ns, interval_ns) ? later_ns : guess_ns;
+  }
+
+  /// Scans that no sweep is near.
+  std::size_t astray(Nanoseconds delay_ns, Nanoseconds interval_ns) const {
+    std::size_t count = 0;
+    for (std::size_t i = first_scan(); i < there_.scans.size(); ++i) {
+      const Nanoseconds expected_ns = stamp_ns(i) + delay_ns;
+      const Nanoseconds off_ns = there_.sweeps[nearest(expected_ns)].arrival_ns - expected_ns;
+      count += 2 * std::abs(off_ns) > interval_ns ? 1 : 0;
+    }
+    return count;
+  }
+
+  std::size_t nearest(Nanoseconds arrival_ns) const {
+    const auto after = not_before(arrival_ns);
+    if (after == there_.sweeps.begin()) {
+      return 0;
+    }
+    const auto before = std::prev(after);
+    const bool earlier = after == there_.sweeps.end() ||
+                         arrival_ns - before->arrival_ns <= after->arrival_ns - arrival_ns;
+    return static_cast<std::size_t>((earlier ? before : after) - there_.sweeps.begin());
+  }
+
+  /// One scan for each sweep, where two are on neighbours.
+  static void share_out(std::vector<std::vector<std::size_t>>& scans_of) {
+    const auto count = static_cast<std::ptrdiff_t>(scans_of.size());
+    const auto at = [&](std::ptrdiff_t i) -> auto& {
+      return scans_of[static_cast<std::size_t>(i)];
+    };
+    for (std::ptrdiff_t i = 0; i < count; ++i) {
+      for (std::ptrdiff_t j = std::max<std::ptrdiff_t>(0, i - kJitterSweeps);
+           at(i).empty() && j <= std::min(count - 1, i + kJitterSweeps);
+           ++j) {
+        if (at(j).size() > 1) {
+          const auto moved = j < i ? std::prev(at(j).end()) : at(j).begin();
+          at(i).push_back(*moved);
+          at(j).erase(moved);
+        }
+      }
+    }
+  }
+
+  const SweepsAndScans& there_;
+  std::vector<std::optional<std::size_t>> scan_of_;
+};
+
+/// How many sweeps had been refused at each scan. What was received and not used was refused, or
+/// still waited; so the least of this from a scan on is an upper bound, met when nothing waits.
+std::vector<std::uint64_t> refused_until(const SweepsAndScans& there) {
+  std::vector<std::uint64_t> refused(there.scans.size());
+  std::uint64_t least = there.refused.value_or(std::numeric_limits<std::uint64_t>::max());
+  for (std::size_t i = there.scans.size(); i-- > 0;) {
+    const LioStatus& status = there.scans[i].status;
+    least =
+        std::min(least, status.scans_received - std::min(status.scans_received, status.scans_used));
+    refused[i] = least;
+  }
+  return refused;
+}
+
+/// Goes through the sweeps in order.
+class GapFinder {
+ public:
+  explicit GapFinder(const SweepsAndScans& there)
+      : there_(there), answers_(there), refused_(refused_until(there)) {
+    if (answers_.first_scan() > 0) {
+      refused_before_ = refused_[answers_.first_scan() - 1];
+    }
+  }
+
+  std::vector<MissedScans> find() {
+    for (std::size_t i = 0; i < there_.sweeps.size(); ++i) {
+      if (i > 0 && is_between(there_.run_begins, arrival_ns(i - 1), arrival_ns(i))) {
+        close(refused_at_next(i));
+      }
+      const auto scan = answers_.scan_of(i);
+      if (!scan) {
+        add(i);
+        continue;
+      }
+      gap_.before_ns = answers_.stamp_ns(*scan);
+      close(refused_[*scan]);
+      refused_before_ = std::max(refused_before_, refused_[*scan]);
+      gap_.after_ns = answers_.stamp_ns(*scan);
+    }
+    close(refused_at_next(there_.sweeps.size()));
+    return missed_;
+  }
+
+ private:
+  Nanoseconds arrival_ns(std::size_t sweep) const { return there_.sweeps[sweep].arrival_ns; }
+
+  std::uint64_t refused_at_next(std::size_t sweep) const {
+    for (; sweep < there_.sweeps.size(); ++sweep) {
+      if (const auto scan = answers_.scan_of(sweep)) {
+        return refused_[*scan];
+      }
+    }
+    return there_.refused.value_or(refused_before_);
+  }
+
+  void add(std::size_t sweep) {
+    gap_.first_ns = gap_.scans == 0 ? arrival_ns(sweep) : gap_.first_ns;
+    gap_.newest_ns = arrival_ns(sweep);
+    ++gap_.scans;
+  }
+
+  /// `refused_now`: from the beginning to the end of the gap.
+  void close(std::uint64_t refused_now) {
+    const std::uint64_t here =
+        std::min(gap_.scans, refused_now - std::min(refused_now, refused_before_));
+    refused_before_ += here;
+    gap_.scans -= here;
+    if (gap_.scans > 0) {
+      gap_.silence_s = to_seconds(gap_.before_ns.value_or(gap_.newest_ns) -
+                                  gap_.after_ns.value_or(gap_.first_ns));
+      missed_.push_back(gap_);
+    }
+    gap_ = {};
+  }
+
+  const SweepsAndScans& there_;
+  Answers answers_;
+  std::vector<std::uint64_t> refused_;
+  std::uint64_t refused_before_{0};
+  MissedScans gap_;  ///< since the newest scan
+  std::vector<MissedScans> missed_;
+};
+
+std::string where(const MissedScans& gap) {
+  const std::string from = gap.after_ns ? exporter::stamp_text(*gap.after_ns)
+                           : gap.before_ns
+                               ? "the first one at " + exporter::stamp_text(gap.first_ns)
+                               : exporter::stamp_text(gap.first_ns);
+  const std::string to = gap.before_ns ? exporter::stamp_text(*gap.before_ns)
+                                       : "the last one at " + exporter::stamp_text(gap.newest_ns);
+  return "between " + from + " and " + to + " (" + fixed(gap.silence_s, 2) + " s)";
+}
+
+std::optional<std::uint64_t> refused_by_mapper(const SessionData& data) {
+  const std::string prefix = "points.refused.";
+  for (const ProgramCounts& program : data.counts) {
+    if (program.program != "lio_mapper") {
+      continue;
+    }
+    std::uint64_t refused = 0;
+    for (const NamedCount& count : program.counts) {
+      refused += count.name.starts_with(prefix) ? count.count : 0;
+    }
+    return refused;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::vector<MissedScans> find_unanswered_sweeps(const SweepsAndScans& there) {
+  return there.sweeps.empty() ? std::vector<MissedScans>{} : GapFinder(there).find();
+}
+
+std::vector<MissedScans> find_missed_scans(const std::vector<exporter::LoggedScan>& scans,
+                                           const Breaks& run_begins) {
+  std::vector<double> intervals_s;
+  for (std::size_t i = 1; i < scans.size(); ++i) {
+    const Nanoseconds before_ns = scans[i - 1].status.stamp_ns;
+    const Nanoseconds stamp_ns = scans[i].status.stamp_ns;
+    intervals_s.push_back(
+        is_between(run_begins, before_ns, stamp_ns) ? 0.0 : to_seconds(stamp_ns - before_ns));
+  }
+  const double usual_s = median_of(intervals_s);
+  std::vector<MissedScans> missed;
+  for (std::size_t i = 0; i < intervals_s.size(); ++i) {
+    if (usual_s > 0.0 && intervals_s[i] > kGapIntervals * usual_s) {
+      missed.push_back({scans[i].status.stamp_ns,
+                        scans[i + 1].status.stamp_ns,
+                        static_cast<std::uint64_t>(std::llround(intervals_s[i] / usual_s)) - 1,
+                        intervals_s[i],
+                        0,
+                        0});
+    }
+  }
+  return missed;
+}
+
+std::vector<MissedScans> missed_scans_of(const SessionData& data) {
+  if (!data.has_scan_log) {
+    return {};  // no mapper had a part in it
+  }
+  if (!data.sweeps.empty()) {
+    return find_unanswered_sweeps(
+        {data.sweeps, data.scans, refused_by_mapper(data), data.run_begins()});
+  }
+  return data.restarts.empty() ? std::vector<MissedScans>{}
+                               : find_missed_scans(data.scans, data.run_begins());
+}
+
+std::string print_missed(const SessionData& data, const std::vector<MissedScans>& missed) {
+  std::uint64_t sum = 0;
+  std::string list;
+  for (const MissedScans& gap : missed) {
+    sum += gap.scans;
+    list += "- " + std::to_string(gap.scans) + " " + where(gap) + "\n";
+  }
+  const std::string of = data.sweeps.empty()
+                             ? ", by their usual interval: which sweeps there were nobody wrote "
+                               "down, so what is missing at the beginning or the end does not show"
+                             : " of the " + std::to_string(data.sweeps.size()) +
+                                   " sweeps that there were (refused ones are under Messages)";
+  return "Scans missed: " + std::to_string(sum) + of + (list.empty() ? ".\n" : ":\n\n" + list);
+}
+
+std::string lost_end(const SessionData& data, const std::vector<MissedScans>& missed) {
+  if (data.sweeps.empty() || missed.empty() || missed.back().before_ns ||
+      missed.back().newest_ns != data.sweeps.back().arrival_ns) {
+    return "";
+  }
+  const MissedScans& end = missed.back();
+  const Breaks begins = data.run_begins();
+  const auto of_last_drive =
+      std::count_if(data.sweeps.begin(), data.sweeps.end(), [&](const auto& sweep) {
+        return begins.empty() || sweep.arrival_ns >= begins.back();
+      });
+  const double share_of_drive = static_cast<double>(end.scans) /
+                                static_cast<double>(std::max<std::ptrdiff_t>(1, of_last_drive));
+  const bool considerable = end.silence_s > kRestart_s ||
+                            (end.silence_s > kOnItsWay_s && share_of_drive >= kConsiderableShare);
+  if (!considerable) {
+    return "";
+  }
+  return std::to_string(end.scans) + " of " + std::to_string(of_last_drive) +
+         " sweeps were never answered by the mapper, " +
+         (end.after_ns ? "the last " + fixed(end.silence_s, 1) +
+                             " s: it did not come back before the end, or was that far behind"
+                       : std::string("from the first to the last")) +
+         ". What was driven then is not in the map.";
+}
+
+}  // namespace trigpoint::evaluation

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the Trigpoint developers
+#include "missed_scans.hpp"
+
+#include "trigpoint/evaluation/report.hpp"
+
+#include "../export/scratch_folder.hpp"
+#include "made_session.hpp"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+
+namespace trigpoint::evaluation {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using trigpoint::test::ScratchFolder;
+using trigpoint::test::write_all;
+
+constexpr Nanoseconds kStart_ns = 1'700'000'000'000'000'000;
+constexpr Nanoseconds kInterval_ns = 100'000'000;
+const ReportOptions kTextOnly{false, "gnuplot", {}};
+
+/// Of sweep k: from its last point at 0.1 (k + 1) s to its arrival.
+using Delay = std::function<Nanoseconds(int)>;
+using Answered = std::function<bool(int)>;
+
+struct Drive {
+  std::vector<exporter::LoggedSweep> sweeps;
+  std::vector<exporter::LoggedScan> scans;
+};
+
+Drive drive(
+    int count,
+    const Answered& answered,
+    const Delay& delay = [](int) { return 3'000'000; }) {
+  Drive made;
+  for (int k = 0; k < count; ++k) {
+    const Nanoseconds end_ns = kStart_ns + kInterval_ns * (k + 1);
+    made.sweeps.push_back({end_ns - kInterval_ns, end_ns + delay(k), end_ns + delay(k)});
+    if (answered(k)) {
+      auto& scan = made.scans.emplace_back();
+      scan.status.stamp_ns = end_ns;
+      scan.status.scans_received = scan.status.scans_used = made.scans.size();
+    }
+  }
+  return made;
+}
+
+std::vector<MissedScans> missed_in(const Drive& made, std::uint64_t refused = 0) {
+  return find_unanswered_sweeps({made.sweeps, made.scans, refused, {}});
+}
+
+TEST(UnansweredSweeps, are_none_where_every_one_was_answered) {
+  EXPECT_THAT(missed_in(drive(100, [](int) { return true; })), IsEmpty());
+  EXPECT_THAT(missed_in({}), IsEmpty());
+}
+
+TEST(UnansweredSweeps, are_found_in_the_middle_between_the_scans_around_them) {
+  const auto missed = missed_in(drive(100, [](int k) { return k < 40 || k >= 47; }));
+  ASSERT_EQ(missed.size(), 1U);
+  EXPECT_EQ(missed[0].scans, 7U);
+  EXPECT_EQ(missed[0].after_ns, kStart_ns + 40 * kInterval_ns);
+  EXPECT_EQ(missed[0].before_ns, kStart_ns + 48 * kInterval_ns);
+  EXPECT_NEAR(missed[0].silence_s, 0.8, 1e-9);
+}
+
+TEST(UnansweredSweeps, are_found_at_the_beginning_and_at_the_end) {
+  const auto missed = missed_in(drive(100, [](int k) { return k >= 20 && k < 60; }));
+  ASSERT_EQ(missed.size(), 2U);
+  EXPECT_FALSE(missed[0].after_ns);
+  EXPECT_EQ(missed[0].scans, 20U);
+  EXPECT_EQ(missed[1].scans, 40U);
+  EXPECT_EQ(missed[1].after_ns, kStart_ns + 60 * kInterval_ns);
+  EXPECT_FALSE(missed[1].before_ns);
+  EXPECT_NEAR(missed[1].silence_s, 4.003, 1e-9);
+}
+
+TEST(UnansweredSweeps, are_all_when_no_scan_came) {
+  const auto missed = missed_in(drive(100, [](int) { return false; }));
+  ASSERT_EQ(missed.size(), 1U);
+  EXPECT_EQ(missed[0].scans, 100U);
+}
+
+/// Arrivals that jitter by more than half an interval, and an IMU whose newest sample is older than
+/// the sweep's last point.
+TEST(UnansweredSweeps, are_counted_right_when_arrivals_jitter_or_are_early) {
+  const auto answered = [](int k) { return k < 40 || k >= 47; };
+  const auto count = [&](const Delay& delay) {
+    std::uint64_t sum = 0;
+    for (const MissedScans& gap : missed_in(drive(100, answered, delay))) {
+      sum += gap.scans;
+    }
+    return sum;
+  };
+  EXPECT_EQ(count([](int k) { return Nanoseconds{10'000'000} + (k % 3) * 30'000'000; }), 7U);
+  EXPECT_EQ(count([](int) { return Nanoseconds{-4'000'000}; }), 7U);
+  EXPECT_EQ(count([](int) { return Nanoseconds{95'000'000}; }), 7U);
+}
+
+/// Half of those at the end were refused with a reason, and ten of the beginning.
+TEST(UnansweredSweeps, are_not_those_that_were_refused_with_a_reason) {
+  Drive made = drive(100, [](int k) { return k >= 10 && k < 60; });
+  for (auto& scan : made.scans) {
+    scan.status.scans_received += 10;
+  }
+  const auto missed = missed_in(made, 30);
+  ASSERT_EQ(missed.size(), 1U);
+  EXPECT_EQ(missed[0].scans, 20U);
+  EXPECT_FALSE(missed[0].before_ns);
+  EXPECT_THAT(missed_in(made, 50), IsEmpty());
+}
+
+/// A mapper that is behind has received more than it has used, and refused none.
+TEST(UnansweredSweeps, are_not_explained_by_what_waits) {
+  Drive made = drive(100, [](int k) { return k < 40 || k >= 47; });
+  for (std::size_t i = 40; i < 60; ++i) {
+    made.scans[i].status.scans_received += 12;
+  }
+  const auto missed = missed_in(made);
+  ASSERT_EQ(missed.size(), 1U);
+  EXPECT_EQ(missed[0].scans, 7U);
+}
+
+TEST(UnansweredSweeps, of_two_days_are_not_what_lies_between_them) {
+  Drive made = drive(50, [](int k) { return k < 48; });
+  const Nanoseconds day_ns = 86'400 * kNanosecondsPerSecond;
+  for (int k = 0; k < 50; ++k) {
+    exporter::LoggedSweep sweep = made.sweeps[static_cast<std::size_t>(k)];
+    sweep.arrival_ns += day_ns;
+    made.sweeps.push_back(sweep);
+    if (k >= 3) {
+      auto& scan = made.scans.emplace_back();
+      scan.status.stamp_ns = kStart_ns + kInterval_ns * (k + 1) + day_ns;
+      scan.status.scans_received = scan.status.scans_used = made.scans.size();
+    }
+  }
+  const auto missed = find_unanswered_sweeps({made.sweeps, made.scans, 0, {kStart_ns + day_ns}});
+  ASSERT_EQ(missed.size(), 2U);
+  EXPECT_EQ(missed[0].scans, 2U);
+  EXPECT_FALSE(missed[0].before_ns);
+  EXPECT_EQ(missed[1].scans, 3U);
+  EXPECT_FALSE(missed[1].after_ns);
+}
+
+TEST(Restarts, count_the_scans_missed_by_the_usual_interval) {
+  std::vector<exporter::LoggedScan> scans;
+  for (const int tenth : {0, 1, 2, 3, 8, 9, 10, 12, 13}) {
+    scans.emplace_back().status.stamp_ns = 1'000'000'000 + tenth * Nanoseconds{100'000'000};
+  }
+  const std::vector<MissedScans> missed = find_missed_scans(scans);
+  ASSERT_EQ(missed.size(), 2U);
+  EXPECT_EQ(missed[0].scans, 4U);
+  EXPECT_EQ(missed[0].after_ns, 1'300'000'000);
+  EXPECT_EQ(missed[0].before_ns, 1'800'000'000);
+  EXPECT_EQ(missed[1].scans, 1U);
+  EXPECT_TRUE(find_missed_scans({}).empty());
+  EXPECT_EQ(find_missed_scans(scans, {1'800'000'000}).size(), 1U);  // another day begins
+}
+
+/// The made session with a mapper that was started again and answered no sweep after `last`.
+ReportResult report_of_lost_end(const ScratchFolder& folder, int last) {
+  test::make_session(folder.path());
+  exporter::SweepLog sweeps(folder.file("sweeps.csv"));
+  exporter::ScanLog scans(folder.file("scans.csv"));
+  for (int k = 0; k <= test::kScans; ++k) {
+    const Nanoseconds stamp_ns = kStart_ns + k * kInterval_ns;
+    sweeps.append({stamp_ns - kInterval_ns, stamp_ns, stamp_ns + 1'000'000});
+    if (k <= last) {
+      LioStatus status;
+      status.stamp_ns = stamp_ns;
+      status.aligned = true;
+      status.scans_received = status.scans_used = static_cast<std::uint64_t>(k) + 1;
+      scans.append(status, 4000);
+    }
+  }
+  write_all(folder.file("restarts.csv"),
+            "unix_s,program,restarted,lived_s,what\n"
+            "1700000000,trigpoint_lio_mapper,1,23.1,\"was killed by signal 9 (Killed)\"\n");
+  return write_report(folder.path(), kTextOnly);
+}
+
+TEST(Report, fails_when_the_mapper_never_came_back) {
+  const ScratchFolder folder;
+  const ReportResult result = report_of_lost_end(folder, 400);
+  EXPECT_THAT(result.failures,
+              ElementsAre(AllOf(HasSubstr("800 of 1201 sweeps were never answered"),
+                                HasSubstr("the last 80.0 s"))));
+  EXPECT_THAT(result.text,
+              AllOf(HasSubstr("## Failed"),
+                    HasSubstr("Scans missed: 800 of the 1201 sweeps"),
+                    HasSubstr("- 800 between 1700000040.000000000 and the last one at "
+                              "1700000120.001000000 (80.00 s)")));
+}
+
+TEST(Report, lists_what_a_restart_at_the_end_costs_and_does_not_fail_for_it) {
+  const ScratchFolder folder;
+  const ReportResult result = report_of_lost_end(folder, test::kScans - 12);
+  EXPECT_THAT(result.failures, IsEmpty());
+  EXPECT_THAT(result.text, HasSubstr("Scans missed: 12 of the 1201 sweeps"));
+}
+
+TEST(Report, tells_missed_scans_also_without_a_restart) {
+  const ScratchFolder folder;
+  report_of_lost_end(folder, test::kScans - 12);
+  std::filesystem::remove(folder.file("restarts.csv"));
+  const std::string text = write_report(folder.path(), kTextOnly).text;
+  EXPECT_THAT(text, AllOf(HasSubstr("## Scans missed"), Not(HasSubstr("## Restarts"))));
+}
+
+}  // namespace
+}  // namespace trigpoint::evaluation
