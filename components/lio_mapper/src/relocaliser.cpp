@@ -28,14 +28,13 @@ constexpr double kFar_m = 50.0;        // where too little is near, and headings
 constexpr double kGroundRadius_m = 12.0;
 constexpr double kStandsOut_m = 0.5;  // above the ground
 constexpr std::size_t kCoarsePoints = 200;
-constexpr std::size_t kClimbPoints = 500;
-constexpr std::size_t kJudgedPoints = 2000;
+constexpr std::size_t kFinePoints = 2000;
 constexpr std::size_t kRefinedPoints = 3000;
 constexpr std::size_t kFewestPoints = 80;
 /// The best places of the grid climb, and the best hills' too: so often at half the steps, within a
 /// step of the grid.
 constexpr std::size_t kClimbing = 8;
-constexpr int kHalvings = 3;
+constexpr int kHalvings = 4;
 constexpr int kMostClimbs = 4;  // at steps of one size
 /// Of the grid's places that climb, none is so near to a better one.
 constexpr double kNeighbour_m = 1.0;
@@ -52,11 +51,10 @@ constexpr double kSameField_m = 5.0;
 constexpr double kRefined_m = 0.5;
 constexpr double kRefined_rad = 0.05;
 constexpr std::int64_t kMaxIterations = 20;
-constexpr int kRounds = 6;
-constexpr double kArrived_m = 0.02;
-constexpr double kPriorPosition_m = 3.0;
-constexpr double kPriorLevel_rad = 0.01;
-constexpr double kPriorYaw_rad = 0.2;
+/// Of the top of a hill.
+constexpr double kTopPosition_m = 0.15;
+constexpr double kTopYaw_rad = 0.02;
+constexpr double kLevel_rad = 0.01;  // of the scan's
 
 struct Hypothesis {
   Vector3d p_odom_m;
@@ -87,8 +85,7 @@ struct Parts {
   double reach_m{kNear_m};               ///< of the points that stand out
   std::size_t count{0};                  ///< of these
   std::vector<Vector3d> coarse_level_m;  ///< of these, for the grid,
-  std::vector<Vector3d> climb_level_m;   ///< for climbing
-  std::vector<Vector3d> judged_level_m;  ///< and for the verdict
+  std::vector<Vector3d> fine_level_m;    ///< for climbing and the verdict
 };
 
 Parts parts_of(const LevelScan& scan) {
@@ -113,8 +110,7 @@ Parts parts_of(const LevelScan& scan) {
   }
   parts.count = level.size();
   parts.coarse_level_m = thinned(level, kCoarsePoints);
-  parts.climb_level_m = thinned(level, kClimbPoints);
-  parts.judged_level_m = thinned(level, kJudgedPoints);
+  parts.fine_level_m = thinned(level, kFinePoints);
   return parts;
 }
 
@@ -178,7 +174,7 @@ class Search {
   }
 
   double share_at(const Pose& T_odom_level, std::size_t centre) const {
-    std::vector<Vector3d> points = parts_.judged_level_m;
+    std::vector<Vector3d> points = parts_.fine_level_m;
     for (Vector3d& p : points) {
       p = T_odom_level.q * p;
     }
@@ -285,25 +281,24 @@ class Search {
     return best;
   }
 
-  /// The best place within a step of a hypothesis of the grid, its height too.
+  /// The best place within a step of a hypothesis of the grid, at its height.
   Hypothesis climbed(const Hypothesis& start) const {
-    const auto moved = [&](const Eigen::Vector4d& steps) {
+    const auto moved = [&](const Vector3d& steps) {
       Hypothesis h = start;
-      h.p_odom_m += kStep_m * steps.head<3>();
-      h.yaw_rad = wrap_angle(h.yaw_rad + yaw_step_rad_ * steps.w());
-      h.score = score_of(h.p_odom_m, turned(parts_.climb_level_m, h.yaw_rad), h.centre);
+      h.p_odom_m.head<2>() += kStep_m * steps.head<2>();
+      h.yaw_rad = wrap_angle(h.yaw_rad + yaw_step_rad_ * steps.z());
+      h.score = score_of(h.p_odom_m, turned(parts_.fine_level_m, h.yaw_rad), h.centre);
       return h;
     };
-    Eigen::Vector4d at = Eigen::Vector4d::Zero();  // in steps of the grid
+    Vector3d at = Vector3d::Zero();  // in steps of the grid
     Hypothesis best = moved(at);
     double step = 1.0;
     for (int halving = 0; halving < kHalvings; ++halving) {
       step *= 0.5;
       for (int climb = 0; climb < kMostClimbs; ++climb) {
-        const Eigen::Vector4d from = at;
-        for (int i = 0; i < 8; ++i) {
-          const Eigen::Vector4d to =
-              from + (i % 2 == 0 ? step : -step) * Eigen::Vector4d::Unit(i / 2);
+        const Vector3d from = at;
+        for (int i = 0; i < 6; ++i) {
+          const Vector3d to = from + (i % 2 == 0 ? step : -step) * Vector3d::Unit(i / 2);
           if (to.cwiseAbs().maxCoeff() > 1.0) {
             continue;
           }
@@ -341,35 +336,26 @@ std::optional<Pose> refined(const Hypothesis& h,
   prior.T_odom_base = {(from_yaw(h.yaw_rad) * scan.q_level_base).normalized(), h.p_odom_m};
   constexpr double kNothing = 1e-12;
   ErrorMatrix covariance = kNothing * ErrorMatrix::Identity();
-  const double position2 = kPriorPosition_m * kPriorPosition_m;
+  const double position2 = kTopPosition_m * kTopPosition_m;
   const Eigen::Matrix3d R = scan.q_level_base.toRotationMatrix();
-  Eigen::Matrix3d turn = kPriorLevel_rad * kPriorLevel_rad * Eigen::Matrix3d::Identity();
-  turn(2, 2) = kPriorYaw_rad * kPriorYaw_rad;
+  Eigen::Matrix3d turn = kLevel_rad * kLevel_rad * Eigen::Matrix3d::Identity();
+  turn(2, 2) = kTopYaw_rad * kTopYaw_rad;
   covariance.block<3, 3>(error::kPosition, error::kPosition) =
       position2 * Eigen::Matrix3d::Identity();
   covariance.block<3, 3>(error::kRotation, error::kRotation) = R.transpose() * turn * R;
   const Pose T_base_lidar{Eigen::Quaterniond::Identity(), scan.lidar_position_base_m};
-  // From metres away a scan is worth little, and the prior holds on: so it begins again where it
-  // came to.
-  for (int round = 0; round < kRounds; ++round) {
-    ScanMatcher matcher(points_base, map, T_base_lidar, matching, workers);  // axes play no part
-    const UpdateResult result = iterated_update(prior,
-                                                covariance,
-                                                [&](const Pose& T) { return matcher.linearise(T); },
-                                                {kMaxIterations,
-                                                 matching.converged_position_m,
-                                                 matching.converged_rotation_rad,
-                                                 static_cast<std::size_t>(matching.min_matches)});
-    if (!result.used) {
-      return std::nullopt;
-    }
-    const double moved_m = (result.state.T_odom_base.p - prior.T_odom_base.p).norm();
-    prior.T_odom_base = result.state.T_odom_base;
-    if (moved_m < kArrived_m) {
-      break;
-    }
+  ScanMatcher matcher(points_base, map, T_base_lidar, matching, workers);  // axes play no part
+  const UpdateResult result = iterated_update(prior,
+                                              covariance,
+                                              [&](const Pose& T) { return matcher.linearise(T); },
+                                              {kMaxIterations,
+                                               matching.converged_position_m,
+                                               matching.converged_rotation_rad,
+                                               static_cast<std::size_t>(matching.min_matches)});
+  if (!result.used) {
+    return std::nullopt;
   }
-  return prior.T_odom_base;
+  return result.state.T_odom_base;
 }
 
 /// Empty when nothing speaks against it.

@@ -176,7 +176,7 @@ TEST(Relocaliser, finds_its_place_among_trees_within_10_m_and_30_degrees) {
     const RegistrationResult result =
         look(map, seen_from(forest(20 + i), truth), {{expected}, 10.0, 0.5236});
     ASSERT_TRUE(result.accepted) << result.obstacle;
-    EXPECT_LT(away_m(result, truth), 0.15);
+    EXPECT_LT(away_m(result, truth), 0.2);  // leaves tell decimetres
     EXPECT_LT(turned_rad(result, truth), 0.015);
     EXPECT_EQ(result.best->centre.p, expected.p);
   }
