@@ -44,7 +44,7 @@ constexpr double kSame_m = 2.0;
 constexpr double kSame_rad = 0.2;
 /// Where the robot must be within the area, its middle is as good as this much more share at the
 /// rim: along a corridor nothing else tells.
-constexpr double kMiddleLead = 0.05;
+constexpr double kMiddleLead = 0.1;
 /// Centres so near to each other share one field.
 constexpr double kSameField_m = 5.0;
 /// The matcher goes at most so far from the top of the hill: beyond it slid somewhere else.
