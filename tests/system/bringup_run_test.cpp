@@ -19,7 +19,9 @@ namespace fs = std::filesystem;
 std::string told_of(int restarts) {
   const TemporaryFolder folder;
   const std::string bin = folder.path("bin");
+  const std::string ready = folder.path("ready");
   fs::create_directories(bin);
+  fs::create_directories(ready);
   const auto add = [&](const std::string& name, const std::string& body) {
     write_file(bin + "/" + name, "#!/usr/bin/env bash\n" + body);
     fs::permissions(bin + "/" + name, fs::perms::owner_all);
@@ -31,16 +33,16 @@ std::string told_of(int restarts) {
   add("trigpoint",
       "case $1 in\n"
       "  config) printf 'bus:\\n  domain_id: -1\\ngps_odometry:\\n  filter: eskf18\\n' ;;\n"
-      "  play) [[ $* == *--check* ]] || for i in {1..100}; do\n"
-      "          [ -s \"" +
-          folder.path("s") +
-          "/restarts.csv\" ] && break; sleep 0.05; done ;;\n"
+      "  play) [[ $* == *--check* ]] || until [ $(ls " +
+          ready +
+          " | wc -l) = 3 ]; do sleep 0.05; done ;;\n"
           "esac\n");
+  // Ready when it can be ended and the failures stand in the session.
   add("trigpoint_supervise",
       "trap 'exit 0' TERM\n"
       "while [ \"$1\" != --records ]; do shift; done\n"
       "[ -s \"$2\" ] || printf '" +
-          lines + "' >\"$2\"\nwhile :; do sleep 0.05; done\n");
+          lines + "' >\"$2\"\ntouch " + ready + "/$$\nwhile :; do sleep 0.05; done\n");
   for (const char* name : {"lio_mapper", "fusion_gate", "gps_eskf18"}) {
     add(std::string("trigpoint_") + name, "");
   }

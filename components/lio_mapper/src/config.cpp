@@ -200,7 +200,7 @@ void describe_keyframes(KeyframeConfig& c, ConfigFields& f) {
 }
 
 void describe_recovery(RecoveryConfig& c, ConfigFields& f) {
-  f.number("radius_m", c.radius_m, "farthest from the predicted place", kPositive);
+  f.number("radius_m", c.radius_m, "farthest from the predicted place", {1.0, 50.0});
   f.number("yaw_rad", c.yaw_rad, "farthest from the predicted heading", {0.0, 3.1416});
   f.number("min_share",
            c.min_share,

@@ -49,7 +49,7 @@ PoseSearch LostTrack::search_for(ScanFilter& filter,
         predicted_ = predicted.T_odom_base;
         found_.reset();
         if (matchable && !since_ns_) {
-          return Sighting{true, std::nullopt};
+          return Sighting{true, std::nullopt, {}};
         }
         if (thinned_base.size() < static_cast<std::size_t>(matching_.min_matches)) {
           obstacle_ = "the sweep has too few points";
@@ -78,7 +78,7 @@ Sighting LostTrack::search(ScanFilter& filter,
     return {};
   }
   found_ = result.best;
-  return {false, found_->T_odom_base};
+  return {false, found_->T_odom_base, found_->spread_m2};
 }
 
 std::optional<Event> LostTrack::conclude(const ScanOutcome& outcome, Nanoseconds scan_ns) {

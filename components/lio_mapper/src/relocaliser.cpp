@@ -45,6 +45,9 @@ constexpr double kSame_rad = 0.2;
 /// Where the robot must be within the area, its middle is as good as this much more share at the
 /// rim: along a corridor nothing else tells.
 constexpr double kMiddleLead = 0.1;
+/// Places with so much less share are as good: it is the mean over points of which many are alike.
+constexpr double kAsGood = 0.05;
+constexpr double kSpreadStep_m = 0.25;
 /// Centres so near to each other share one field.
 constexpr double kSameField_m = 5.0;
 /// The matcher goes at most so far from the top of the hill: beyond it slid somewhere else.
@@ -122,9 +125,10 @@ GroundGrid ground_of(const PointCloud& map_points, const Pose& centre, double ra
   return grid;
 }
 
-/// The points at a heading, about the robot.
-std::vector<Vector3d> turned(const std::vector<Vector3d>& level_m, double yaw_rad) {
-  const Eigen::Matrix3d R = from_yaw(yaw_rad).toRotationMatrix();
+/// The points in axes of odom, about the robot.
+std::vector<Vector3d> turned(const std::vector<Vector3d>& level_m,
+                             const Quaterniond& q_odom_level) {
+  const Eigen::Matrix3d R = q_odom_level.toRotationMatrix();
   std::vector<Vector3d> result;
   result.reserve(level_m.size());
   for (const Vector3d& p : level_m) {
@@ -174,11 +178,28 @@ class Search {
   }
 
   double share_at(const Pose& T_odom_level, std::size_t centre) const {
-    std::vector<Vector3d> points = parts_.fine_level_m;
-    for (Vector3d& p : points) {
-      p = T_odom_level.q * p;
-    }
+    const auto points = turned(parts_.fine_level_m, T_odom_level.q);
     return mean_likelihood(field_of(centre), points, T_odom_level.p);
+  }
+
+  /// Scatter, in the plane, of the places about this one that are as good.
+  Eigen::Matrix2d spread_about(const Pose& T_odom_level, std::size_t centre) const {
+    const auto points = turned(parts_.fine_level_m, T_odom_level.q);
+    const LikelihoodField& field = field_of(centre);
+    const double least = mean_likelihood(field, points, T_odom_level.p) - kAsGood;
+    const int steps = static_cast<int>(std::min(area_.radius_m + kStep_m, kSame_m) / kSpreadStep_m);
+    Eigen::Matrix2d sum = Eigen::Matrix2d::Zero();
+    int count = 0;
+    for (int x = -steps; x <= steps; ++x) {
+      for (int y = -steps; y <= steps; ++y) {
+        const Vector3d offset_m = kSpreadStep_m * Vector3d(x, y, 0.0);
+        if (mean_likelihood(field, points, T_odom_level.p + offset_m) >= least) {
+          sum += offset_m.head<2>() * offset_m.head<2>().transpose();
+          ++count;  // the place itself at least
+        }
+      }
+    }
+    return sum / count;
   }
 
   double share_at(const Hypothesis& h) const {
@@ -211,7 +232,7 @@ class Search {
       return 0.0;
     }
     const double away_m = (place_m - area_.centres_odom[centre].p).head<2>().norm();
-    const double ratio = away_m / area_.radius_m;
+    const double ratio = away_m / std::max(area_.radius_m, kStep_m);
     return kMiddleLead * (1.0 - ratio * ratio);
   }
 
@@ -253,7 +274,7 @@ class Search {
     workers_.run(headings, [&](std::size_t heading) {
       const double yaw_rad = wrap_angle(yaw_of(area_.centres_odom[centre].q) +
                                         yaw_step_rad_ * (static_cast<int>(heading) - turns));
-      const std::vector<Vector3d> points = turned(parts_.coarse_level_m, yaw_rad);
+      const std::vector<Vector3d> points = turned(parts_.coarse_level_m, from_yaw(yaw_rad));
       for (std::size_t i = 0; i < places.size(); ++i) {
         all[heading * places.size() + i] = {
             places[i], yaw_rad, centre, score_of(places[i], points, centre)};
@@ -287,7 +308,7 @@ class Search {
       Hypothesis h = start;
       h.p_odom_m.head<2>() += kStep_m * steps.head<2>();
       h.yaw_rad = wrap_angle(h.yaw_rad + yaw_step_rad_ * steps.z());
-      h.score = score_of(h.p_odom_m, turned(parts_.fine_level_m, h.yaw_rad), h.centre);
+      h.score = score_of(h.p_odom_m, turned(parts_.fine_level_m, from_yaw(h.yaw_rad)), h.centre);
       return h;
     };
     Vector3d at = Vector3d::Zero();  // in steps of the grid
@@ -433,7 +454,9 @@ RegistrationResult register_scan(const LevelScan& scan,
   Registration& best = result.best.emplace();
   best.T_odom_base = *T;
   best.centre = area.centres_odom[top.centre];
-  best.share = search.share_at({T->q * scan.q_level_base.conjugate(), T->p}, top.centre);
+  const Pose T_odom_level(T->q * scan.q_level_base.conjugate(), T->p);
+  best.share = search.share_at(T_odom_level, top.centre);
+  best.spread_m2 = search.spread_about(T_odom_level, top.centre);
   for (const Hypothesis& other : hills) {
     if (!is_near(other, top, kSame_m, kSame_rad)) {
       best.runner_up_share = std::max(best.runner_up_share, search.share_at(other));

@@ -41,7 +41,9 @@ struct Registration {
   Pose T_odom_base;
   double share{0.0};            ///< mean likelihood of the points that stand out: 1 on the map
   double runner_up_share{0.0};  ///< of the best place that is another one
-  Pose centre;                  ///< of the search area, from which the search came there
+  /// Scatter of the places around that are as good, in the plane of odom: large along a corridor.
+  Eigen::Matrix2d spread_m2{Eigen::Matrix2d::Zero()};
+  Pose centre;  ///< of the search area, from which the search came there
 };
 
 struct RegistrationResult {

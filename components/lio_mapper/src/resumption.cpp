@@ -233,6 +233,7 @@ Resumption::Found Resumption::compose(const StartResult& start,
   const ErrorMatrix at_start = P;
   P = covariance_from(checkpoint_, at_start);
   set_pose_and_velocity(at_start, T_old_new.q.toRotationMatrix(), P);
+  P.block<2, 2>(error::kPosition, error::kPosition) += registration.spread_m2;
   const double away_s = to_seconds(found.initial.stamp_ns - checkpoint_.stamp_ns);
   let_biases_walk(config_.imu, std::max(0.0, away_s), P);
   const double moved_m = (state.T_odom_base.p - checkpoint_.T_odom_base.p).norm();

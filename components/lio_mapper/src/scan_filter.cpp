@@ -281,6 +281,9 @@ bool ScanFilter::search(const PoseSearch& look,
     return sighting.match_as_usual;
   }
   const Pose& found = *sighting.T_odom_base;
+  Matrix3d covariance_m2 = kFoundPosition_m * kFoundPosition_m * Matrix3d::Identity();
+  covariance_m2.topLeftCorner<2, 2>() += sighting.spread_m2;
+  const Matrix3d position = covariance_m2.inverse();
   // An ordinary measurement of the whole pose: the cross-covariances that grew while the IMU was
   // alone correct velocity and biases with it. d Log(R_found^T R exp(e)) / de = J_r^-1.
   const UpdateResult result = iterated_update(
@@ -289,12 +292,11 @@ bool ScanFilter::search(const PoseSearch& look,
       [&](const Pose& T) {
         const Vector3d turn = so3_log(found.q.conjugate() * T.q);
         const Matrix3d J = so3_right_jacobian_inverse(turn);
-        constexpr double kPosition = 1.0 / (kFoundPosition_m * kFoundPosition_m);
         constexpr double kRotation = 1.0 / (kFoundRotation_rad * kFoundRotation_rad);
         PoseInformation pose;
-        pose.information.topLeftCorner<3, 3>() = kPosition * Matrix3d::Identity();
+        pose.information.topLeftCorner<3, 3>() = position;
         pose.information.bottomRightCorner<3, 3>() = kRotation * J.transpose() * J;
-        pose.gradient.head<3>() = kPosition * (T.p - found.p);
+        pose.gradient.head<3>() = position * (T.p - found.p);
         pose.gradient.tail<3>() = kRotation * J.transpose() * turn;
         pose.count = static_cast<std::size_t>(config_.matching.min_matches);
         return pose;

@@ -58,6 +58,7 @@ struct Past {
 struct Sighting {
   bool match_as_usual{false};  ///< the prediction is good enough
   std::optional<Pose> T_odom_base;
+  Eigen::Matrix2d spread_m2{Eigen::Matrix2d::Zero()};  ///< of places around that are as good
 };
 
 /// Finds a scan in the map whose predicted pose may be too uncertain for matching.

@@ -179,6 +179,7 @@ TEST(Relocaliser, finds_its_place_among_trees_within_10_m_and_30_degrees) {
     EXPECT_LT(away_m(result, truth), 0.2);  // leaves tell decimetres
     EXPECT_LT(turned_rad(result, truth), 0.015);
     EXPECT_EQ(result.best->centre.p, expected.p);
+    EXPECT_LT(result.best->spread_m2.trace(), 0.3 * 0.3);
   }
 }
 
@@ -214,6 +215,9 @@ TEST(Relocaliser, stays_near_the_middle_along_a_corridor_where_the_area_holds_th
   EXPECT_LT(std::abs(error_m.y()), 0.05);                       // walls tell
   EXPECT_LT(std::abs(error_m.x() + 0.2), 0.5 * area.radius_m);  // nothing but the centre tells
   EXPECT_LT(turned_rad(result, truth), 0.01);
+  // And says so.
+  EXPECT_GT(std::sqrt(result.best->spread_m2(0, 0)), 0.5);
+  EXPECT_LT(std::sqrt(result.best->spread_m2(1, 1)), 0.2);
 }
 
 TEST(Relocaliser, does_not_depend_on_the_number_of_threads) {
