@@ -17,6 +17,7 @@ namespace {
 using namespace std::chrono_literals;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using tests::CommandResult;
 using tests::run_command;
 using tests::TemporaryFolder;
@@ -113,16 +114,61 @@ TEST(Bringup, names_a_program_that_is_not_built_before_it_makes_a_session) {
   }
 }
 
-/// So that who has built for one can run the other with --no-build.
-TEST(Bringup, run_and_host_build_the_same) {
-  const TemporaryFolder folder;
+/// As a fresh clone, with a build that only says what it is asked for.
+void clone_scripts(const TemporaryFolder& folder) {
   fs::create_directories(folder.path("bringup"));
-  for (const char* name : {"run", "host"}) {
+  for (const char* name : {"run", "host", "common.sh"}) {
     fs::copy_file(script(name), folder.path("bringup") + "/" + name);
   }
+  fs::create_directories(folder.path("config"));
+  fs::create_directory_symlink(std::string(TRIGPOINT_SOURCE_DIR) + "/config/scenarios",
+                               folder.path("config/scenarios"));
   const std::string build = folder.path("bringup/build");
   tests::write_file(build, "#!/bin/sh\necho built: \"$@\"\nexit 1\n");
   fs::permissions(build, fs::perms{0755});
+}
+
+TEST(Bringup, run_and_host_find_what_they_can_before_they_build) {
+  const TemporaryFolder folder;
+  clone_scripts(folder);
+  fs::create_directories(folder.path("used"));
+  tests::write_file(folder.path("used/file"), "");
+  const std::vector<std::pair<std::vector<std::string>, std::string>> mistakes{
+      {{"run", "short", "--rate", "abc"}, "--rate must be 'max' or a number above 0"},
+      {{"run", "short", "--rate", "0.0"}, "--rate must be 'max' or a number above 0"},
+      {{"run", "short", "--seed", "1.5"}, "--seed must be a whole number"},
+      {{"run", "short", "--duration", "-1"}, "--duration must be a number above 0"},
+      {{"run", "short", "--start", "x"}, "--start must be a number of 0 or more"},
+      {{"run", "short", "--nonsense"}, "unknown argument '--nonsense'"},
+      {{"run", "nosuch"},
+       "nosuch: no such file or folder, nor a scenario; scenarios are: campus, "},
+      {{"run", "nosuch+wheel_odometry"}, "nosuch+wheel_odometry: no such file or folder"},
+      {{"run", "short", "--out", folder.path("used")}, "is not empty"},
+      {{"host", "base", "--play", "short", "--rate", "abc"}, "--rate must be 'max' or"},
+      {{"host", "base", "--play", "nosuch"}, "nosuch: no such file or folder"},
+      {{"host", "base", "--for", "nosuch"}, "nosuch: no such file or folder"},
+      {{"host", "base", "--out", folder.path("used")}, "is not empty"}};
+  for (const auto& [arguments, said] : mistakes) {
+    std::vector<std::string> command = arguments;
+    command.front() = folder.path("bringup") + "/" + arguments.front();
+    const CommandResult result = run_command(command);
+    EXPECT_EQ(result.exit_code, 2) << said << ": " << result.output;
+    EXPECT_THAT(result.output,
+                AllOf(HasSubstr("bringup/" + arguments.front() + ": "),
+                      HasSubstr(said),
+                      Not(HasSubstr("built"))));
+  }
+  for (const char* log : {"short", "short+street_traffic", "short+motion.start_m=5"}) {
+    const CommandResult good =
+        run_command({folder.path("bringup/run"), log, "--rate", "1.5e0", "--start", "2.5"});
+    EXPECT_THAT(good.output, HasSubstr("built: trigpoint_job\n")) << log;
+  }
+}
+
+/// So that who has built for one can run the other with --no-build.
+TEST(Bringup, run_and_host_build_the_same) {
+  const TemporaryFolder folder;
+  clone_scripts(folder);
   for (const auto& [name, argument] : {std::pair{"run", "short"}, std::pair{"host", "base"}}) {
     const CommandResult result =
         run_command({folder.path("bringup") + "/" + name, argument, "--out", folder.path("s")});

@@ -103,6 +103,18 @@ TEST_F(HostRestart, of_killed_processes_leaves_the_others_alone_and_is_listed) {
   EXPECT_EQ(std::count(restarts.begin(), restarts.end(), '\n'), 1 + 1 + 2) << restarts;
 }
 
+TEST_F(HostRestart, of_one_process_is_counted_in_words) {
+  const auto running = host({"gate"});
+  const std::string program = "trigpoint_fusion_gate";
+  ASSERT_TRUE(comes_true([&] { return lives_of(program) == 1; })) << running->output_so_far();
+  kill(pid_of(program), SIGKILL);
+  ASSERT_TRUE(comes_true([&] { return lives_of(program) == 2; })) << running->output_so_far();
+  running->signal(SIGTERM);
+  const CommandResult result = running->wait(kForever);
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("bringup/host: a process failed once; see " + part_));
+}
+
 TEST_F(HostRestart, does_not_try_again_what_cannot_be) {
   write_file(folder_.path("c.yaml"), "fusion_gate: {no_such_key: 1}\n");
   const auto refused = host({"base", "--config", folder_.path("c.yaml")})->wait(kForever);
