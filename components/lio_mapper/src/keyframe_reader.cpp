@@ -68,10 +68,8 @@ PointCloud raw_points(const Statement& row, int column) {
 }  // namespace
 
 struct KeyframeReader::Impl {
-  explicit Impl(const std::string& file) : database(opened(file)) {
-    if (has_log(file)) {
-      database.leave_log();  // who reads changes nothing
-    }
+  explicit Impl(const std::string& path) : file(path), database(opened(path)) {
+    database.leave_log();  // who reads changes nothing
     version = store::version_of(database);
     if (version < store::kRawPointsVersion || version > store::kFormatVersion) {
       database.fail("has format version " + std::to_string(version) + ", this program reads " +
@@ -79,6 +77,16 @@ struct KeyframeReader::Impl {
                     std::to_string(store::kFormatVersion));
     }
   }
+
+  /// Asked at the end: a writer may have come and been killed in between.
+  ~Impl() {
+    if (!has_log(file)) {
+      database.remove_log();
+    }
+  }
+
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
 
   bool has_all() const { return version > store::kRawPointsVersion; }
 
@@ -208,6 +216,7 @@ struct KeyframeReader::Impl {
     }
   }
 
+  std::string file;
   Database database;
   std::int64_t version{0};
   std::optional<std::vector<std::int64_t>> order;  ///< row numbers by time

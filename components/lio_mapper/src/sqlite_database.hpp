@@ -40,7 +40,20 @@ class Database {
 
   /// What a killed writer left in the write-ahead log stays there when this is closed, instead of
   /// being moved into the file.
-  void leave_log() { sqlite3_db_config(handle_, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr); }
+  void leave_log() {
+    int leaves = 0;
+    if (sqlite3_db_config(handle_, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, &leaves) != SQLITE_OK ||
+        leaves != 1) {
+      fail(
+          "this SQLite cannot leave a write-ahead log as it is, so reading would change the store");
+    }
+  }
+
+  /// For a log that has nothing in it: its empty files go when this is closed. Where it fails, they
+  /// stay.
+  void remove_log() noexcept {
+    sqlite3_db_config(handle_, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 0, nullptr);
+  }
 
   [[noreturn]] void fail() const {
     throw std::runtime_error(file_ + ": keyframe store: " + sqlite3_errmsg(handle_));

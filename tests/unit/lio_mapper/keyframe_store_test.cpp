@@ -453,5 +453,43 @@ TEST_F(KeyframeStore, is_not_changed_by_a_reader_after_its_writer_was_killed) {
   EXPECT_TRUE(log == bytes_of(left / "keyframes.sqlite-wal"));
 }
 
+/// The reader is the last to close the store then.
+TEST_F(KeyframeStore, is_not_changed_by_a_reader_while_whose_reading_a_writer_came_and_was_killed) {
+  { KeyframeWriter(file()).append(keyframe(1)); }
+  std::array<int, 2> begin{};
+  ASSERT_EQ(::pipe(begin.data()), 0);
+  const pid_t writer = ::fork();  // before anything is open: SQLite must not be carried along
+  ASSERT_GE(writer, 0);
+  if (writer == 0) {
+    char any = 0;
+    const bool begins = ::read(begin[0], &any, 1) == 1;
+    KeyframeWriter killed(file());
+    killed.append(keyframe(2));
+    ::_exit(begins ? 0 : 1);  // as a kill: nothing is closed
+  }
+  std::string store;
+  {
+    KeyframeReader reader(file());
+    EXPECT_EQ(reader.visit([](const Keyframe&) {}), 1U);
+    store = bytes_of(file());
+    ASSERT_EQ(::write(begin[1], "b", 1), 1);
+    int status = -1;
+    ASSERT_EQ(::waitpid(writer, &status, 0), writer);
+    ASSERT_EQ(status, 0);
+    EXPECT_EQ(reader.visit([](const Keyframe&) {}), 2U);
+  }
+  ::close(begin[0]);
+  ::close(begin[1]);
+  EXPECT_TRUE(store == bytes_of(file()));
+  EXPECT_FALSE(bytes_of(folder_ / "keyframes.sqlite-wal").empty());
+}
+
+TEST_F(KeyframeStore, has_nothing_beside_it_when_it_was_read_after_its_writer_ended) {
+  { KeyframeWriter(file()).append(keyframe(1)); }
+  EXPECT_EQ(KeyframeReader(file()).visit([](const Keyframe&) {}), 1U);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "keyframes.sqlite-wal"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "keyframes.sqlite-shm"));
+}
+
 }  // namespace
 }  // namespace trigpoint::lio_mapper
