@@ -2,11 +2,14 @@
 // Copyright the Trigpoint developers
 // What `trigpoint map --resume` and `--localize` leave of the stored session, found or not.
 #include "run_command.hpp"
+#include "wait_until.hpp"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <csignal>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -28,26 +31,27 @@ constexpr const char* kQuick = "lio_mapper: {recovery: {attempts: 1}}\n";
 class StoredSession : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    folder_ = new TemporaryFolder;
+    folder_ = std::make_unique<TemporaryFolder>();
     tests::write_file(folder_->path("quick.yaml"), kQuick);
     const CommandResult made = map({"short", "--duration", "8", "--out", folder_->path("session")});
     ASSERT_EQ(made.exit_code, 0) << made.output;
   }
 
-  static void TearDownTestSuite() {
-    delete folder_;
-    folder_ = nullptr;
-  }
+  static void TearDownTestSuite() { folder_.reset(); }
 
   void SetUp() override {
     fs::copy(folder_->path("session"), session(), fs::copy_options::recursive);
     before_ = bytes_of(session());
   }
 
-  static CommandResult map(std::vector<std::string> arguments) {
+  static std::vector<std::string> map_command(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), {std::string(TRIGPOINT_BIN_DIR) + "/trigpoint", "map"});
     arguments.insert(arguments.end(), {"--config", folder_->path("quick.yaml")});
-    return tests::run_command(arguments, 120s);
+    return arguments;
+  }
+
+  static CommandResult map(const std::vector<std::string>& arguments) {
+    return tests::run_command(map_command(arguments), 120s);
   }
 
   /// By name within the folder.
@@ -79,11 +83,11 @@ class StoredSession : public ::testing::Test {
   TemporaryFolder own_;
 
  private:
-  static TemporaryFolder* folder_;
+  static std::unique_ptr<TemporaryFolder> folder_;
   std::map<std::string, std::string> before_;
 };
 
-TemporaryFolder* StoredSession::folder_ = nullptr;
+std::unique_ptr<TemporaryFolder> StoredSession::folder_;
 
 std::vector<std::string> with(std::vector<std::string> arguments,
                               const std::vector<std::string>& more) {
@@ -98,8 +102,7 @@ TEST_F(StoredSession, stays_as_it_is_when_the_next_drive_does_not_find_its_place
   const std::string apart = session() + ".not_resumed";
   EXPECT_THAT(first.output,
               AllOf(HasSubstr("was not found in the stored map"),
-                    HasSubstr(session() + " is as it was"),
-                    HasSubstr("a session of its own, about the same datum: " + apart),
+                    HasSubstr("was not found in the map of " + session() + ", which is as it was"),
                     HasSubstr("trigpoint merge " + session() + " " + apart)));
   EXPECT_TRUE(fs::exists(apart + "/keyframes.sqlite"));
   EXPECT_TRUE(fs::exists(apart + "/map.pcd"));
@@ -108,6 +111,22 @@ TEST_F(StoredSession, stays_as_it_is_when_the_next_drive_does_not_find_its_place
   EXPECT_EQ(second.exit_code, 1) << second.output;
   expect_as_it_was();
   EXPECT_TRUE(fs::exists(apart + "-2/keyframes.sqlite"));
+}
+
+/// What comes after it may be interrupted.
+TEST_F(StoredSession, is_told_to_be_as_it_was_before_the_drive_that_was_not_found_is_mapped) {
+  tests::Command mapping(map_command(with(drive_elsewhere(), {"--resume", session()})));
+  const std::string told = session() +
+                           " is as it was; the new drive becomes a session of its own, about the "
+                           "same datum: " +
+                           session() + ".not_resumed";
+  const auto is_told = [&] { return mapping.output_so_far().find(told) != std::string::npos; };
+  EXPECT_TRUE(tests::wait_until([&] { return is_told() || !mapping.running(); }, 60s));
+  mapping.signal(SIGINT);
+  const CommandResult interrupted = mapping.wait(60s);
+  EXPECT_EQ(interrupted.exit_code, 130) << interrupted.output;
+  EXPECT_THAT(interrupted.output, HasSubstr(told));
+  expect_as_it_was();
 }
 
 TEST_F(StoredSession, goes_on_when_the_next_drive_finds_its_place_after_one_that_did_not) {

@@ -128,6 +128,14 @@ struct MapOutcome {
   bool stopped_in_trial{false};  ///< by the user; nothing is written
 };
 
+/// At once: mapping and report, which follow, may be interrupted.
+void tell_not_found(const MapOutcome& outcome, const std::string& out) {
+  std::cerr << "trigpoint map: the robot was not found in the stored map ("
+            << outcome.why_not_resumed << "). " << outcome.kept_as_it_was
+            << " is as it was; the new drive becomes a session of its own, about the same datum: "
+            << out << "\n";
+}
+
 /// Nothing is written into the session before its place in the map is known. A drive that does not
 /// find it becomes a session of its own, about the same datum.
 void try_to_resume(MapOptions& options,
@@ -145,6 +153,7 @@ void try_to_resume(MapOptions& options,
     outcome.kept_as_it_was = std::exchange(options.resume, {});
     options.out = folder_apart_from(outcome.kept_as_it_was);
     stored.reset();
+    tell_not_found(outcome, options.out);
   }
 }
 
@@ -194,9 +203,8 @@ MapOutcome map(MapOptions& options) {
 }
 
 void tell_not_resumed(const MapOutcome& outcome, const std::string& out) {
-  std::cerr << "trigpoint map: the robot was not found in the stored map ("
-            << outcome.why_not_resumed << "). " << outcome.kept_as_it_was
-            << " is as it was; the new drive is a session of its own, about the same datum: " << out
+  std::cerr << "trigpoint map: the robot was not found in the map of " << outcome.kept_as_it_was
+            << ", which is as it was; the new drive is " << out
             << ". One map of both, by GPS and where they meet: trigpoint merge "
             << as_shell_word(outcome.kept_as_it_was) << " " << as_shell_word(out)
             << " --out DIR. Or try --resume again, with a log that begins near the stored "
