@@ -518,6 +518,15 @@ TEST(Command, simulate_names_the_next_command_as_a_shell_takes_it) {
   EXPECT_THAT(echo.output, HasSubstr("<" + drive + ">"));
 }
 
+TEST(Command, a_folder_that_is_no_session_is_a_usage_error) {
+  const TemporaryFolder folder;
+  for (const char* verb : {"evaluate", "report", "export"}) {
+    const CommandResult result = trigpoint({verb, folder.path()});
+    EXPECT_EQ(result.exit_code, 2) << verb << result.output;
+    EXPECT_THAT(result.output, HasSubstr("session")) << verb;
+  }
+}
+
 TEST(Command, evaluate_fails_when_a_file_of_the_session_cannot_be_read) {
   const TemporaryFolder folder;
   fs::create_directories(folder.path("s"));

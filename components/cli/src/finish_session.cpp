@@ -2,6 +2,7 @@
 // Copyright the Trigpoint developers
 #include "finish_session.hpp"
 
+#include "trigpoint/base/config.hpp"
 #include "trigpoint/evaluation/report.hpp"
 #include "trigpoint/export/correct_session.hpp"
 #include "trigpoint/export/map.hpp"
@@ -91,6 +92,14 @@ void render_map(const std::string& session) {
 }
 
 }  // namespace
+
+void refuse_other_folder(const std::string& folder) {
+  try {
+    evaluation::check_is_session(folder);
+  } catch (const std::runtime_error& error) {
+    throw ConfigError(error.what());
+  }
+}
 
 int finish_session(const std::string& session) {
   evaluation::check_is_session(session);  // before anything is written into the folder

@@ -6,6 +6,9 @@
 
 namespace trigpoint::cli {
 
+/// Throws ConfigError when `folder` is no session: whoever named it meant another.
+void refuse_other_folder(const std::string& folder);
+
 /// Renders map.pcd from the keyframes and writes report.md with its pictures; prints the table.
 /// Returns an exit code.
 int finish_session(const std::string& session);

@@ -8,6 +8,7 @@
 #include "trigpoint/simulator/scenario.hpp"
 #include "trigpoint/simulator/surfaces.hpp"
 
+#include "finish_session.hpp"
 #include "input.hpp"
 #include "number_checks.hpp"
 #include "verbs.hpp"
@@ -65,6 +66,11 @@ void check_map_options(const EvaluateOptions& options) {
 }
 
 void check_inputs(const EvaluateOptions& options) {
+  for (const std::string& input : {options.input.estimate, options.input.reference}) {
+    if (std::filesystem::is_directory(input)) {
+      refuse_other_folder(input);
+    }
+  }
   if (!options.input.lio_file.empty() && std::filesystem::is_directory(options.input.estimate)) {
     throw ConfigError("--lio goes with a file; the session " + options.input.estimate +
                       " brings its own lio.tum");
@@ -83,8 +89,8 @@ void refuse_to_overwrite(const EvaluateOptions& options) {
 int run(EvaluateOptions options) {
   refuse_to_overwrite(options);
   options.input.largest_gap_ns = from_seconds(options.largest_gap_s);
-  check_map_options(options);
   check_inputs(options);
+  check_map_options(options);
   options.input.may_be_empty = options.map;
   evaluation::Comparison comparison = evaluation::compare(options.input);
   if (options.map) {

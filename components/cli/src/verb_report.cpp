@@ -4,6 +4,7 @@
 #include "verbs.hpp"
 
 #include <memory>
+#include <string>
 
 namespace trigpoint::cli {
 
@@ -14,7 +15,12 @@ void add_report(CLI::App& app, Chosen& chosen) {
   verb->add_option("SESSION", *session, "folder that bringup/run or trigpoint map has left")
       ->required()
       ->check(CLI::ExistingDirectory);
-  verb->callback([session, &chosen] { chosen = [session] { return finish_session(*session); }; });
+  verb->callback([session, &chosen] {
+    chosen = [session] {
+      refuse_other_folder(*session);
+      return finish_session(*session);
+    };
+  });
 }
 
 }  // namespace trigpoint::cli
