@@ -15,6 +15,7 @@ namespace trigpoint::cli {
 struct Finding {
   std::string topic;
   std::string sentence;
+  bool is_wrong{true};  ///< false: a hint, that may well be no fault
 };
 
 /// Writers of a known topic that send another type, and writers outside of ROS 2's names.

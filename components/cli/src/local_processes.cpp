@@ -97,9 +97,4 @@ std::vector<LocalProcess> local_processes() {
   return found;
 }
 
-std::optional<char> state_of_process(unsigned number) {
-  const auto stat = stat_of(number);
-  return stat ? std::optional(stat->state) : std::nullopt;
-}
-
 }  // namespace trigpoint::cli

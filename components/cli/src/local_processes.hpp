@@ -20,7 +20,4 @@ struct LocalProcess {
 /// The GPS filters, the mapper, the gate and the clock watch.
 std::vector<LocalProcess> local_processes();
 
-/// How process `number` stands; nothing when there is none to be read.
-std::optional<char> state_of_process(unsigned number);
-
 }  // namespace trigpoint::cli

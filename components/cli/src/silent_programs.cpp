@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cstdio>
 #include <map>
 #include <set>
@@ -20,7 +21,7 @@ using recording::TopicSurvey;
 
 /// Two words missed.
 constexpr double kSilent_s = 2.0;
-/// One that ends leaves within a second of its last word.
+/// One that ends with nothing left to write leaves within a second of its last word.
 constexpr double kLeftInSilence_s = 1.5;
 
 /// What tells that a program is one of these, and what its silence is told under.
@@ -105,6 +106,17 @@ std::string named(const Party& party, const std::string& participant) {
   return owner_text(party.process, participant);
 }
 
+/// What the bus takes its environment for; nothing when that cannot be read or is no number.
+std::optional<int> domain_in_environment(const LocalProcess& process) {
+  if (!process.domain || process.domain->empty()) {
+    return process.domain ? std::optional(0) : std::nullopt;
+  }
+  int domain = 0;
+  const char* end = process.domain->data() + process.domain->size();
+  const auto [read_to, error] = std::from_chars(process.domain->data(), end, domain);
+  return error == std::errc{} && read_to == end ? std::optional(domain) : std::nullopt;
+}
+
 /// A clause: what a silent process of this kind does, and what to do about it.
 std::string remedy(const std::string& main_topic, std::optional<char> state, unsigned process) {
   if (state == 'T') {
@@ -116,8 +128,8 @@ std::string remedy(const std::string& main_topic, std::optional<char> state, uns
   }
   return (main_topic == "lio/status"
               ? std::string("it looks for its place in the map, in which it may be silent for 20 "
-                            "s, or hangs. Listen again with --seconds 25; if it is silent then "
-                            "too, ")
+                            "s, or ends and writes what it has, or hangs. Listen again with "
+                            "--seconds 25; if it is silent then too, ")
               : std::string("it hangs, or gets no processor: ")) +
          "end it and start it again, it goes on in its session (trigpoint_supervise does so by "
          "itself)";
@@ -236,8 +248,9 @@ std::vector<Finding> silent_on_the_bus(const std::vector<TopicSurvey>& surveys,
     } else if (party.left_in_silence) {
       found.push_back({party.main_topic,
                        named(party, participant) + " was there, said nothing any more and left " +
-                           "the bus without a word: it was killed or stopped, or its network is "
-                           "gone"});
+                           "the bus: it has ended and wrote for long what it had, or it was killed "
+                           "or stopped, or its network is gone (its log, or that of its "
+                           "supervisor, says which)"});
     }
   }
   const std::vector<Finding> filters = silent_filters(surveys, parties, robot);
@@ -257,20 +270,22 @@ std::vector<Finding> not_on_the_bus(const std::vector<TopicSurvey>& surveys,
   }
   std::vector<Finding> found;
   for (const LocalProcess& process : local) {
-    const bool is_for_us = process.domain && (process.domain->empty() ? "0" : *process.domain) ==
-                                                 std::to_string(domain);
-    if (!is_for_us || process.age_s <= listened_s || on_the_bus.contains(process.number)) {
+    if (domain_in_environment(process) != domain || process.age_s <= listened_s ||
+        on_the_bus.contains(process.number)) {
       continue;
     }
+    const bool is_stopped = process.state == 'T';
     found.push_back(
         {process.program,
-         "process " + std::to_string(process.number) + " runs here with ROS_DOMAIN_ID " +
-             std::to_string(domain) + " and was not found on the bus in " +
-             seconds_text(listened_s) + ": " +
-             (process.state == 'T'
-                  ? remedy("", process.state, process.number)
-                  : "it hangs or still starts; or its configuration has another bus.domain_id, "
-                    "network_interface or security_folder than this command's")});
+         "process " + std::to_string(process.number) + " runs here " +
+             (process.domain->empty() ? std::string("without ROS_DOMAIN_ID")
+                                      : "with ROS_DOMAIN_ID " + *process.domain) +
+             " and was not found on the bus in " + seconds_text(listened_s) + ": " +
+             (is_stopped ? remedy("", process.state, process.number)
+                         : "it is for another bus (a container's, or its configuration has another "
+                           "bus.domain_id, network_interface or security_folder than this "
+                           "command's), or it still starts, or hangs"),
+         is_stopped});
   }
   return found;
 }

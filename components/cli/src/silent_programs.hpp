@@ -19,8 +19,10 @@ std::vector<Finding> silent_on_the_bus(const std::vector<recording::TopicSurvey>
                                        const std::vector<LocalProcess>& local,
                                        const RobotConfig& robot);
 
-/// Processes of ours that run here for this `domain` (as far as they tell) for longer than was
-/// listened, and were not found on the bus: one that is stopped answers nobody who comes later.
+/// Processes of ours that run here for this `domain`, by their environment, for longer than was
+/// listened, and were not found on the bus: one that is stopped answers nobody who comes later. Of
+/// all others it is a hint: their configuration, or the container they are in, may have them on
+/// another bus.
 std::vector<Finding> not_on_the_bus(const std::vector<recording::TopicSurvey>& surveys,
                                     const std::vector<LocalProcess>& local,
                                     int domain,

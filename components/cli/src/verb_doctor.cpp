@@ -44,6 +44,15 @@ int tell(const std::string& topic, const std::vector<std::string>& remarks) {
   return remarks.empty() ? 0 : 1;
 }
 
+/// 0 when it is a hint only.
+int tell(const Finding& finding) {
+  if (finding.is_wrong) {
+    return tell(finding.topic, {finding.sentence});
+  }
+  std::cout << "  " << finding.topic << ": " << finding.sentence << "\n";
+  return 0;
+}
+
 std::string refused_advice(const std::string& policy) {
   return "a writer offers less than we ask for (" + policy + ")" +
          (policy == "RELIABILITY" ? ": read as best effort; set it to reliable where clouds or IMU "
@@ -106,7 +115,7 @@ int examine_bus(const DoctorOptions& options) {
         not_on_the_bus(surveys, local, domain, options.seconds),
         mapper_without_track(surveys, robot)}) {
     for (const Finding& finding : findings) {
-      wrong |= tell(finding.topic, {finding.sentence});
+      wrong |= tell(finding);
     }
   }
   std::cout << (endpoints.empty() ? "on the bus: nobody else\n" : "on the bus:\n");

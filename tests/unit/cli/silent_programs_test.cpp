@@ -4,7 +4,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 namespace trigpoint::cli {
 namespace {
@@ -16,6 +15,7 @@ using ::testing::Field;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
+using ::testing::SizeIs;
 
 const RobotConfig kRobot;
 
@@ -86,7 +86,9 @@ TEST(SilentPrograms, are_told_with_how_their_process_stands) {
   EXPECT_THAT(silent_on_the_bus(surveys, stopped, kRobot),
               one("lio/status", HasSubstr("kill -CONT 123")));
   EXPECT_THAT(silent_on_the_bus(surveys, {}, kRobot),
-              one("lio/status", HasSubstr("left the bus without a word")));
+              one("lio/status",
+                  HasSubstr("left the bus: it has ended and wrote for long what it had, or it was "
+                            "killed")));
   // One that is ended says so at once.
   for (TopicSurvey& survey : surveys) {
     survey.silent_before_leaving_s[kMapper + "00000003"] = 0.6;
@@ -121,7 +123,7 @@ TEST(SilentPrograms, are_those_that_run_here_for_this_domain_and_were_not_found)
   EXPECT_THAT(not_on_the_bus(nobody, {process}, 7, 5.0),
               one("trigpoint_lio_mapper",
                   AllOf(HasSubstr("process 123 runs here with ROS_DOMAIN_ID 7"),
-                        HasSubstr("not found on the bus in 5.0 s: it hangs"))));
+                        HasSubstr("not found on the bus in 5.0 s: it is for another bus"))));
   LocalProcess stopped = process;
   stopped.state = 'T';
   EXPECT_THAT(not_on_the_bus(nobody, {stopped}, 7, 5.0),
@@ -132,13 +134,29 @@ TEST(SilentPrograms, are_those_that_run_here_for_this_domain_and_were_not_found)
   EXPECT_THAT(not_on_the_bus(nobody, {new_one}, 7, 5.0), IsEmpty());
   LocalProcess unset = process;
   unset.domain = "";
-  EXPECT_THAT(not_on_the_bus(nobody, {unset}, 0, 5.0), testing::SizeIs(1));
+  EXPECT_THAT(not_on_the_bus(nobody, {unset}, 0, 5.0),
+              one("trigpoint_lio_mapper", HasSubstr("runs here without ROS_DOMAIN_ID")));
+  LocalProcess written_otherwise = process;
+  written_otherwise.domain = "07";
+  EXPECT_THAT(not_on_the_bus(nobody, {written_otherwise}, 7, 5.0), SizeIs(1));
+  LocalProcess no_number = process;
+  no_number.domain = "7a";
+  EXPECT_THAT(not_on_the_bus(nobody, {no_number}, 7, 5.0), IsEmpty());
   LocalProcess of_another_user = process;
   of_another_user.domain.reset();
   EXPECT_THAT(not_on_the_bus(nobody, {of_another_user}, 7, 5.0), IsEmpty());
   std::vector<TopicSurvey> found = nobody;
   found[0].processes[kMapper + "00000003"] = 123;
   EXPECT_THAT(not_on_the_bus(found, {process}, 7, 5.0), IsEmpty());
+}
+
+/// Its YAML may have another domain, or it is in a container: it may be well.
+TEST(SilentPrograms, that_were_not_found_are_wrong_only_where_they_are_stopped) {
+  const LocalProcess runs{123, "trigpoint_lio_mapper", 'S', 60.0, ""};
+  EXPECT_THAT(not_on_the_bus({}, {runs}, 0, 5.0), ElementsAre(Field(&Finding::is_wrong, false)));
+  LocalProcess stopped = runs;
+  stopped.state = 'T';
+  EXPECT_THAT(not_on_the_bus({}, {stopped}, 0, 5.0), ElementsAre(Field(&Finding::is_wrong, true)));
 }
 
 TEST(MapperWithoutTrack, is_told_with_what_it_does) {
@@ -165,11 +183,6 @@ TEST(MapperWithoutTrack, is_told_with_what_it_does) {
   EXPECT_THAT(mapper_without_track(surveys, kRobot),
               one("lio/status", HasSubstr("INIT: it has not begun")));
   EXPECT_THAT(mapper_without_track(mapper(0.2, 9), kRobot), IsEmpty());
-}
-
-TEST(LocalProcesses, of_this_computer_are_read) {
-  EXPECT_EQ(state_of_process(static_cast<unsigned>(::getpid())), 'R');
-  EXPECT_EQ(state_of_process(4'000'000'000U), std::nullopt);
 }
 
 }  // namespace
