@@ -13,7 +13,6 @@
 #include <Eigen/Geometry>
 
 #include <cstddef>
-#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
