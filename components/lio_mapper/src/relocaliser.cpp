@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <stdexcept>
 
 namespace trigpoint::lio_mapper {
 
@@ -69,7 +70,7 @@ struct Hypothesis {
 };
 
 bool is_near(const Hypothesis& a, const Hypothesis& b, double distance_m, double turn_rad) {
-  return (a.p_odom_m - b.p_odom_m).head<2>().norm() < distance_m &&
+  return (a.p_odom_m - b.p_odom_m).norm() < distance_m &&  // another floor is another place
          std::abs(wrap_angle(a.yaw_rad - b.yaw_rad)) < turn_rad;
 }
 
@@ -435,6 +436,9 @@ RegistrationResult register_scan(const LevelScan& scan,
                                  const MatchingConfig& matching,
                                  const RecoveryConfig& config,
                                  Workers& workers) {
+  if (area.centres_odom.empty()) {
+    throw std::invalid_argument("register_scan: the area has no centre");
+  }
   RegistrationResult result;
   const ScanParts parts = parts_of(scan.points_base, scan.q_level_base);
   if (map.empty() || parts.count < ScanParts::kFewest) {

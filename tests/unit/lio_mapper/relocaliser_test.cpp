@@ -221,6 +221,22 @@ TEST(Relocaliser, finds_its_place_above_another_floor) {
       truth);
 }
 
+TEST(Relocaliser, believes_no_floor_of_several_that_are_alike) {
+  PointCloud map = forest(11);
+  for (const PointXyzi& point : lifted(forest(12), [](double) { return -8.0; })) {
+    map.push_back(point);
+  }
+  const RegistrationResult result = look(map,
+                                         seen_from(forest(50), standing_at(4.0, -3.0, 0.4)),
+                                         {{standing_at(-1.0, 2.0, 0.0)}, 10.0, 0.5236});
+  EXPECT_FALSE(result.accepted);
+}
+
+TEST(Relocaliser, refuses_an_area_without_a_centre) {
+  EXPECT_THROW(look(forest(11), seen_from(forest(50), standing_at(0, 0, 0)), {}),
+               std::invalid_argument);
+}
+
 TEST(Relocaliser, finds_its_place_from_a_wrong_height) {
   const Pose truth = standing_at(4.0, -3.0, 0.4);
   Pose expected = standing_at(-1.0, 2.0, 0.0);
