@@ -200,14 +200,17 @@ void describe_keyframes(KeyframeConfig& c, ConfigFields& f) {
 }
 
 void describe_recovery(RecoveryConfig& c, ConfigFields& f) {
-  f.number("radius_m", c.radius_m, "farthest from the predicted place", {1.0, 50.0});
+  f.number("radius_m", c.radius_m, "farthest from the predicted place", {1.0, 25.0});
   f.number("yaw_rad", c.yaw_rad, "farthest from the predicted heading", {0.0, 3.1416});
   f.number("min_share",
            c.min_share,
            "how well the points that stand out of the ground must lie on the map: mean of "
            "exp(-d^2 / (2 (0.25 m)^2)), d to its nearest point",
            {0.0, 1.0});
-  f.number("min_lead", c.min_lead, "of that share over any other place", {0.0, 1.0});
+  f.number("min_lead",
+           c.min_lead,
+           "of that share over any place more than 2 m or 0.2 rad away",
+           {0.0, 1.0});
   f.integer("attempts",
             c.attempts,
             "of a restart, on more and more sweeps, before odom begins anew",

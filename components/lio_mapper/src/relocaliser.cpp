@@ -8,10 +8,12 @@
 #include "iterated_update.hpp"
 #include "likelihood_field.hpp"
 #include "scan_matcher.hpp"
+#include "scan_parts.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <stdexcept>
 
 namespace trigpoint::lio_mapper {
 
@@ -23,14 +25,15 @@ namespace {
 
 constexpr double kStep_m = 0.5;        // of the grid: two sigmas of the field
 constexpr double kYawStep_rad = 0.05;  // 0.6 m at half a step and 25 m
-constexpr double kNear_m = 25.0;       // farther points would fall through the grid of headings
-constexpr double kFar_m = 50.0;        // where too little is near, and headings as much finer
+/// So far from the ground's height, or the predicted one, the height that fits best is looked for.
+constexpr double kHeightReach_m = 0.6;
+constexpr double kHeightStep_m = 0.1;
+constexpr double kSameHeight_m = 0.25;  // as the field's sigma
+/// Heights count by this power of their share: cells are as high as the field's sigma nearly, so
+/// that the middle of the best ones is meant.
+constexpr double kHeightPower = 20.0;
 constexpr double kGroundRadius_m = 12.0;
-constexpr double kStandsOut_m = 0.5;  // above the ground
-constexpr std::size_t kCoarsePoints = 200;
-constexpr std::size_t kFinePoints = 2000;
 constexpr std::size_t kRefinedPoints = 3000;
-constexpr std::size_t kFewestPoints = 80;
 /// The best places of the grid climb, and the best hills' too: so often at half the steps, within a
 /// step of the grid.
 constexpr std::size_t kClimbing = 8;
@@ -46,7 +49,7 @@ constexpr double kSame_rad = 0.2;
 /// rim: along a corridor nothing else tells.
 constexpr double kMiddleLead = 0.1;
 /// Places with so much less share are as good: it is the mean over points of which many are alike.
-constexpr double kAsGood = 0.05;
+constexpr double kAsGood = 0.02;
 constexpr double kSpreadStep_m = 0.25;
 /// Centres so near to each other share one field.
 constexpr double kSameField_m = 5.0;
@@ -67,54 +70,8 @@ struct Hypothesis {
 };
 
 bool is_near(const Hypothesis& a, const Hypothesis& b, double distance_m, double turn_rad) {
-  return (a.p_odom_m - b.p_odom_m).head<2>().norm() < distance_m &&
+  return (a.p_odom_m - b.p_odom_m).norm() < distance_m &&  // another floor is another place
          std::abs(wrap_angle(a.yaw_rad - b.yaw_rad)) < turn_rad;
-}
-
-/// Every n-th, so that at most `most` are left.
-template <typename Points>
-Points thinned(const Points& points, std::size_t most) {
-  Points kept;
-  const std::size_t step = std::max<std::size_t>(1, (points.size() + most - 1) / most);
-  for (std::size_t i = 0; i < points.size(); i += step) {
-    kept.push_back(points[i]);
-  }
-  return kept;
-}
-
-/// The scan in level axes about base, apart into what stands out and the ground.
-struct Parts {
-  double ground_m{0.0};                  ///< height of the ground below base, negative
-  double reach_m{kNear_m};               ///< of the points that stand out
-  std::size_t count{0};                  ///< of these
-  std::vector<Vector3d> coarse_level_m;  ///< of these, for the grid,
-  std::vector<Vector3d> fine_level_m;    ///< for climbing and the verdict
-};
-
-Parts parts_of(const LevelScan& scan) {
-  GroundGrid grid(Vector2d::Zero(), kGroundRadius_m + 2.0);
-  std::vector<Vector3d> level;
-  level.reserve(scan.points_base.size());
-  for (const PointXyzi& point : scan.points_base) {
-    level.push_back(scan.q_level_base * point.position().cast<double>());
-    grid.add(level.back());
-  }
-  Parts parts;
-  parts.ground_m = grid.height_at(Vector2d::Zero(), kGroundRadius_m).value_or(0.0);
-  std::erase_if(level, [&](const Vector3d& point) {
-    return point.z() <= parts.ground_m + kStandsOut_m || point.norm() >= kFar_m;
-  });
-  const auto is_far = [](const Vector3d& point) { return point.norm() >= kNear_m; };
-  const auto far = static_cast<std::size_t>(std::count_if(level.begin(), level.end(), is_far));
-  if (level.size() - far >= kFewestPoints) {
-    std::erase_if(level, is_far);
-  } else {
-    parts.reach_m = kFar_m;
-  }
-  parts.count = level.size();
-  parts.coarse_level_m = thinned(level, kCoarsePoints);
-  parts.fine_level_m = thinned(level, kFinePoints);
-  return parts;
 }
 
 GroundGrid ground_of(const PointCloud& map_points, const Pose& centre, double radius_m) {
@@ -150,12 +107,12 @@ double mean_likelihood(const LikelihoodField& field,
 /// The search of one area.
 class Search {
  public:
-  Search(const SearchArea& area, const Parts& parts, const LocalMap& map, Workers& workers)
+  Search(const SearchArea& area, const ScanParts& parts, const LocalMap& map, Workers& workers)
       : area_(area),
         parts_(parts),
         map_points_(map.points()),
         workers_(workers),
-        yaw_step_rad_(kYawStep_rad * kNear_m / parts.reach_m) {
+        yaw_step_rad_(kYawStep_rad * ScanParts::kNear_m / parts.reach_m) {
     for (const Pose& centre : area.centres_odom) {
       add_field(centre.p);
     }
@@ -168,10 +125,7 @@ class Search {
       const std::vector<Hypothesis> here = scored_grid(i);
       all.insert(all.end(), here.begin(), here.end());
     }
-    std::stable_sort(all.begin(), all.end(), better);
-    std::vector<Hypothesis> best = best_of(all, kNeighbour_m, kNeighbour_rad);
-    const std::vector<Hypothesis> rivals = best_of(all, kSame_m, kSame_rad);
-    best.insert(best.end(), rivals.begin(), rivals.end());
+    std::vector<Hypothesis> best = hills_and_rivals(std::move(all));
     workers_.run(best.size(), [&](std::size_t i) { best[i] = climbed(best[i]); });
     std::stable_sort(best.begin(), best.end(), better);
     return best;
@@ -242,45 +196,63 @@ class Search {
     return mean_likelihood(field_of(centre), turned_m, place_m) + lead_of_middle(place_m, centre);
   }
 
-  /// Places about a centre, each put on the ground.
+  /// Places about a centre: at its height, and on the ground where that is another one. There may
+  /// be a bridge, or a floor below.
   std::vector<Vector3d> places_about(std::size_t centre) const {
     const Pose& T = area_.centres_odom[centre];
     const GroundGrid ground = ground_of(map_points_, T, area_.radius_m);
-    const std::optional<double> ground_here = ground.height_at(T.p.head<2>(), kGroundRadius_m);
     const int steps = static_cast<int>(std::ceil(area_.radius_m / kStep_m));
     std::vector<Vector3d> places;
     for (int x = -steps; x <= steps; ++x) {
       for (int y = -steps; y <= steps; ++y) {
-        const Vector2d offset_m = kStep_m * Vector2d(x, y);
-        if (offset_m.norm() > area_.radius_m + kStep_m) {
+        const Vector3d place_m = T.p + kStep_m * Vector3d(x, y, 0.0);
+        if ((place_m - T.p).norm() > area_.radius_m + kStep_m) {
           continue;
         }
-        const Vector2d place_m = T.p.head<2>() + offset_m;
-        const std::optional<double> height =
-            area_.holds_robot ? std::nullopt : ground.height_at(place_m, kGroundRadius_m);
-        const bool known = !area_.holds_robot && (height || ground_here);
-        const double z = known ? (height ? *height : *ground_here) - parts_.ground_m : T.p.z();
-        places.emplace_back(place_m.x(), place_m.y(), z);
+        places.push_back(place_m);
+        const std::optional<double> height = ground.height_at(place_m.head<2>(), kGroundRadius_m);
+        if (area_.holds_robot || !height || !parts_.ground_m) {
+          continue;
+        }
+        const double z = *height - *parts_.ground_m;
+        if (std::abs(z - place_m.z()) > kSameHeight_m) {
+          places.emplace_back(place_m.x(), place_m.y(), z);
+        }
       }
     }
     return places;
   }
 
+  /// The best of all places and headings about a centre.
   std::vector<Hypothesis> scored_grid(std::size_t centre) {
     const std::vector<Vector3d> places = places_about(centre);
     const int turns = static_cast<int>(std::ceil(area_.yaw_rad / yaw_step_rad_));
-    const auto headings = static_cast<std::size_t>(2 * turns + 1);
-    std::vector<Hypothesis> all(headings * places.size());
-    workers_.run(headings, [&](std::size_t heading) {
+    std::vector<std::vector<Hypothesis>> best(static_cast<std::size_t>(2 * turns + 1));
+    workers_.run(best.size(), [&](std::size_t heading) {
       const double yaw_rad = wrap_angle(yaw_of(area_.centres_odom[centre].q) +
                                         yaw_step_rad_ * (static_cast<int>(heading) - turns));
       const std::vector<Vector3d> points = turned(parts_.coarse_level_m, from_yaw(yaw_rad));
-      for (std::size_t i = 0; i < places.size(); ++i) {
-        all[heading * places.size() + i] = {
-            places[i], yaw_rad, centre, score_of(places[i], points, centre)};
+      std::vector<Hypothesis> all;
+      all.reserve(places.size());
+      for (const Vector3d& place_m : places) {
+        all.push_back({place_m, yaw_rad, centre, score_of(place_m, points, centre)});
       }
+      best[heading] = hills_and_rivals(std::move(all));
     });
+    std::vector<Hypothesis> all;
+    for (const std::vector<Hypothesis>& of_heading : best) {
+      all.insert(all.end(), of_heading.begin(), of_heading.end());
+    }
     return all;
+  }
+
+  /// The best places, close to each other too, and the best that are on other hills.
+  static std::vector<Hypothesis> hills_and_rivals(std::vector<Hypothesis> all) {
+    std::stable_sort(all.begin(), all.end(), better);
+    std::vector<Hypothesis> best = best_of(all, kNeighbour_m, kNeighbour_rad);
+    const std::vector<Hypothesis> rivals = best_of(all, kSame_m, kSame_rad);
+    best.insert(best.end(), rivals.begin(), rivals.end());
+    return best;
   }
 
   /// The first ones of a sorted list, none of them so near to a better one.
@@ -302,8 +274,31 @@ class Search {
     return best;
   }
 
-  /// The best place within a step of a hypothesis of the grid, at its height.
-  Hypothesis climbed(const Hypothesis& start) const {
+  /// At the height at which the scan's ground lies best on the map.
+  Hypothesis settled(Hypothesis h) const {
+    if (parts_.ground_level_m.empty()) {
+      return h;
+    }
+    const auto points = turned(parts_.ground_level_m, from_yaw(h.yaw_rad));
+    const int steps = static_cast<int>(kHeightReach_m / kHeightStep_m);
+    double sum = 0.0;
+    double weighted_m = 0.0;
+    for (int i = -steps; i <= steps; ++i) {
+      const Vector3d offset_m(0.0, 0.0, i * kHeightStep_m);
+      const double share = mean_likelihood(field_of(h.centre), points, h.p_odom_m + offset_m);
+      const double weight = std::pow(share, kHeightPower);
+      sum += weight;
+      weighted_m += weight * offset_m.z();
+    }
+    if (sum > 0.0) {
+      h.p_odom_m.z() += weighted_m / sum;
+    }
+    return h;
+  }
+
+  /// The best place within a step of a hypothesis of the grid.
+  Hypothesis climbed(const Hypothesis& on_grid) const {
+    const Hypothesis start = settled(on_grid);
     const auto moved = [&](const Vector3d& steps) {
       Hypothesis h = start;
       h.p_odom_m.head<2>() += kStep_m * steps.head<2>();
@@ -334,11 +329,11 @@ class Search {
         }
       }
     }
-    return best;
+    return settled(best);
   }
 
   const SearchArea& area_;
-  const Parts& parts_;
+  const ScanParts& parts_;
   PointCloud map_points_;
   Workers& workers_;
   double yaw_step_rad_;
@@ -399,15 +394,23 @@ std::string obstacle_to(const Registration& best,
                   kRefined_rad);
     return text;
   }
-  const bool leads = area.holds_robot || best.share - best.runner_up_share >= config.min_lead;
-  if (best.share < config.min_share || !leads) {
+  if (best.share < config.min_share) {
+    char text[160];
+    std::snprintf(
+        text,
+        sizeof text,
+        "what stands out lies on the map by %.0f %% at the best place, at least %.0f needed",
+        100.0 * best.share,
+        100.0 * config.min_share);
+    return text;
+  }
+  if (!area.holds_robot && best.share - best.runner_up_share < config.min_lead) {
     char text[200];
     std::snprintf(text,
                   sizeof text,
-                  "what stands out lies on the map by %.0f %% at the best place (at least %.0f "
-                  "needed) and by %.0f %% at another one (%.0f less needed)",
+                  "what stands out lies on the map by %.0f %% at the best place and by %.0f %% at "
+                  "another one, at least %.0f less needed",
                   100.0 * best.share,
-                  100.0 * config.min_share,
                   100.0 * best.runner_up_share,
                   100.0 * config.min_lead);
     return text;
@@ -433,13 +436,16 @@ RegistrationResult register_scan(const LevelScan& scan,
                                  const MatchingConfig& matching,
                                  const RecoveryConfig& config,
                                  Workers& workers) {
+  if (area.centres_odom.empty()) {
+    throw std::invalid_argument("register_scan: the area has no centre");
+  }
   RegistrationResult result;
-  const Parts parts = parts_of(scan);
-  if (map.empty() || parts.count < kFewestPoints) {
+  const ScanParts parts = parts_of(scan.points_base, scan.q_level_base);
+  if (map.empty() || parts.count < ScanParts::kFewest) {
     result.obstacle = map.empty() ? "the map is empty there"
                                   : std::to_string(parts.count) +
                                         " points stand out of the ground within 50 m, at least " +
-                                        std::to_string(kFewestPoints) + " needed";
+                                        std::to_string(ScanParts::kFewest) + " needed";
     return result;
   }
   Search search(area, parts, map, workers);

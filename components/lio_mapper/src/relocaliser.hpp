@@ -13,7 +13,6 @@
 #include <Eigen/Geometry>
 
 #include <cstddef>
-#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -57,6 +56,7 @@ struct RegistrationResult {
 /// in the map's likelihood field; the best few climb within their cell of the grid, and the first
 /// is refined with the iterated matcher. Accepted where enough of what stands out lies on the map
 /// and clearly more than at any other place. Deterministic for any number of workers.
+/// Throws std::invalid_argument when the area has no centre.
 RegistrationResult register_scan(const LevelScan& scan,
                                  const LocalMap& map,
                                  const SearchArea& area,

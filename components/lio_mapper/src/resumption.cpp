@@ -248,9 +248,8 @@ Resumption::Found Resumption::compose(const StartResult& start,
   char fit[120];
   std::snprintf(fit,
                 sizeof fit,
-                "; %.0f %% of what stands out lies on the map, %.0f %% at the next best place",
-                100.0 * registration.share,
-                100.0 * registration.runner_up_share);
+                "; %.0f %% of what stands out lies on the map",
+                100.0 * registration.share);
   found.text = offset_text(registration.centre, registration.T_odom_base) + fit;
   return found;
 }
