@@ -393,6 +393,30 @@ TEST(Command, a_play_into_the_session_of_another_one_is_refused) {
   EXPECT_EQ(tests::read_file(folder.path("s") + "/fixes.csv"), before);
 }
 
+/// Whoever starts the player: the report takes what was in flight for no loss.
+TEST(Command, a_play_that_is_stopped_leaves_a_session_that_says_so) {
+  const TemporaryFolder folder;
+  const std::string session = folder.path("s");
+  tests::Command play({program(),
+                       "play",
+                       "short",
+                       "--rate",
+                       "1",
+                       "--allow-no-reader",
+                       "--wait",
+                       "0",
+                       "--session",
+                       session},
+                      {{"ROS_DOMAIN_ID", tests::own_domain(52)}});
+  const auto deadline = std::chrono::steady_clock::now() + 60s;
+  while (!fs::exists(session + "/run.yaml") && std::chrono::steady_clock::now() < deadline) {
+    std::this_thread::sleep_for(20ms);
+  }
+  play.signal(SIGINT);
+  EXPECT_EQ(play.wait(60s).exit_code, 130);
+  EXPECT_THAT(tests::read_file(session + "/run.yaml"), HasSubstr("interrupted: true"));
+}
+
 TEST(Command, two_players_on_one_domain_are_refused_with_the_other_one_s_process) {
   const std::map<std::string, std::string> environment{{"ROS_DOMAIN_ID", tests::own_domain(52)}};
   const tests::Command first({program(), "play", "short", "--rate", "1", "--allow-no-reader"},

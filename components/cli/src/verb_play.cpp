@@ -40,7 +40,8 @@ struct PlayVerbOptions {
 /// The player's part of the session; nothing without a folder.
 class SessionPart {
  public:
-  SessionPart(const std::string& folder, const shell::EventLog& log) : folder_(folder), disk_(log) {
+  SessionPart(const std::string& folder, const shell::EventLog& log)
+      : folder_(folder), log_(log), disk_(log) {
     if (!folder.empty()) {
       exporter::create_session_folder(folder);
       part_.emplace(folder);
@@ -57,18 +58,21 @@ class SessionPart {
   void begin(const recording::LogReader& reader, const SystemConfig& config) {
     if (part_) {
       disk_.keep([&] {
-        write_run(reader, config, 0.0);
-        part_->keep_truth(reader);
+        write_run(reader, config, 0.0, false);
+        keep_truth(reader);
       });
     }
   }
 
-  void close(const recording::LogReader& reader, const SystemConfig& config, double wall_s) {
+  void close(const recording::LogReader& reader,
+             const SystemConfig& config,
+             double wall_s,
+             bool stopped) {
     if (part_) {
       disk_.keep([&] {
         part_->close(reader);
-        write_run(reader, config, wall_s);
-        part_->keep_truth(reader);
+        write_run(reader, config, wall_s, stopped);
+        keep_truth(reader);
       });
     }
   }
@@ -76,22 +80,30 @@ class SessionPart {
   bool failed() const { return disk_.failed(); }
 
  private:
+  void keep_truth(const recording::LogReader& reader) const {
+    if (const auto left_out = part_->keep_truth(reader)) {
+      log_(*left_out);
+    }
+  }
+
   void write_run(const recording::LogReader& reader,
                  const SystemConfig& config,
-                 double wall_s) const {
+                 double wall_s,
+                 bool stopped) const {
     exporter::write_run(exporter::path_in(folder_, exporter::session_file::kRun),
                         {reader.summary().path,
                          "dds",
                          mode_of(config),
                          config.cores.gps_odometry.filter,
-                         to_seconds(part_->last_ns() - part_->first_ns()),
+                         part_->data_s(),
                          wall_s,
-                         false,
+                         stopped,
                          part_->begin_ns(),
                          part_->end_ns()});
   }
 
   std::string folder_;
+  shell::EventLog log_;
   shell::DiskGuard disk_;
   std::optional<pipeline::LogPart> part_;
 };
@@ -170,7 +182,7 @@ int run(const PlayVerbOptions& options) {
   const recording::PlayResult result = recording::play(*input.reader, play);
   const double wall_s =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  session.close(*input.reader, input.config, wall_s);
+  session.close(*input.reader, input.config, wall_s, result.stopped);
   std::cout << "played " << result.sweeps << " sweeps, " << result.imu << " IMU samples, "
             << result.fixes << " fixes in " << wall_s << " s; " << result.unanswered
             << " waits for an answer were given up\n";

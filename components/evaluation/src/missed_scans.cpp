@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 namespace trigpoint::evaluation {
 
@@ -18,6 +19,8 @@ namespace file = exporter::session_file;
 constexpr double kGapIntervals = 1.5;
 /// A sweep may seem to arrive this much before its last point: the IMU's newest sample is older.
 constexpr double kEarlyIntervals = 0.25;
+/// Sweeps do not follow each other by less than this of the usual interval; they only come so.
+constexpr double kLeastIntervals = 0.99;
 /// Sweeps this near to one that two scans fall on may be what one of them belongs to: arrivals
 /// jitter.
 constexpr std::ptrdiff_t kJitterSweeps = 2;
@@ -26,6 +29,7 @@ constexpr double kRestart_s = 3.0;
 /// Of a short drive less is considerable; but not what is always on its way at an end.
 constexpr double kConsiderableShare = 0.1;
 constexpr double kOnItsWay_s = 1.0;
+constexpr std::size_t kListed = 20;
 
 template <typename Value>
 Value median_of(std::vector<Value> values) {
@@ -37,18 +41,37 @@ Value median_of(std::vector<Value> values) {
   return *middle;
 }
 
+/// By the LiDAR's own clock where it goes forward: arrivals may come in bursts.
 Nanoseconds usual_interval_ns(const std::vector<exporter::LoggedSweep>& sweeps) {
   std::vector<Nanoseconds> intervals;
   for (std::size_t i = 1; i < sweeps.size(); ++i) {
-    intervals.push_back(sweeps[i].arrival_ns - sweeps[i - 1].arrival_ns);
+    intervals.push_back(sweeps[i].stamp_ns - sweeps[i - 1].stamp_ns);
   }
-  return median_of(intervals);
+  return std::max<Nanoseconds>(0, median_of(intervals));
+}
+
+/// When the sweeps would have arrived if none had waited for another: each at the latest an
+/// interval before its successor.
+std::vector<Nanoseconds> due_of(const std::vector<exporter::LoggedSweep>& sweeps) {
+  const auto least_ns =
+      static_cast<Nanoseconds>(kLeastIntervals * static_cast<double>(usual_interval_ns(sweeps)));
+  std::vector<Nanoseconds> due_ns(sweeps.size());
+  for (std::size_t i = sweeps.size(); i-- > 0;) {
+    due_ns[i] = sweeps[i].arrival_ns;
+    if (i + 1 < sweeps.size()) {
+      due_ns[i] = std::min(due_ns[i], due_ns[i + 1] - least_ns);
+    }
+  }
+  return due_ns;
 }
 
 /// Finds for every sweep the scan that came of it.
 class Answers {
  public:
-  explicit Answers(const SweepsAndScans& there) : there_(there) {
+  explicit Answers(const SweepsAndScans& there)
+      : there_(there),
+        due_ns_(due_of(there.sweeps)),
+        interval_ns_(usual_interval_ns(there.sweeps)) {
     std::vector<std::vector<std::size_t>> scans_of(there.sweeps.size());
     const Nanoseconds delay_ns = usual_delay_ns();
     for (std::size_t i = first_scan(); i < there.scans.size(); ++i) {
@@ -76,53 +99,51 @@ class Answers {
   }
 
  private:
-  using Sweep = exporter::LoggedSweep;
-
-  std::vector<Sweep>::const_iterator not_before(Nanoseconds arrival_ns) const {
-    return std::lower_bound(
-        there_.sweeps.begin(), there_.sweeps.end(), arrival_ns, [](const Sweep& s, Nanoseconds at) {
-          return s.arrival_ns < at;
-        });
+  std::vector<Nanoseconds>::const_iterator not_before(Nanoseconds due_ns) const {
+    return std::lower_bound(due_ns_.begin(), due_ns_.end(), due_ns);
   }
 
-  /// From a sweep's last point to its arrival: at most an interval, or a little more where the
-  /// first guess leaves more scans without a sweep.
+  /// From a sweep's last point to its arrival: at most an interval, or as many more as leave fewer
+  /// scans without a sweep.
   Nanoseconds usual_delay_ns() const {
-    const Nanoseconds interval_ns = usual_interval_ns(there_.sweeps);
     const auto early_ns =
-        static_cast<Nanoseconds>(kEarlyIntervals * static_cast<double>(interval_ns));
+        static_cast<Nanoseconds>(kEarlyIntervals * static_cast<double>(interval_ns_));
     std::vector<Nanoseconds> delays;
     for (std::size_t i = first_scan(); i < there_.scans.size(); ++i) {
-      const auto sweep = not_before(stamp_ns(i) - early_ns);
-      if (sweep != there_.sweeps.end()) {
-        delays.push_back(sweep->arrival_ns - stamp_ns(i));
+      const auto due_ns = not_before(stamp_ns(i) - early_ns);
+      if (due_ns != due_ns_.end()) {
+        delays.push_back(*due_ns - stamp_ns(i));
       }
     }
-    const Nanoseconds guess_ns = median_of(delays);
-    const Nanoseconds later_ns = guess_ns + interval_ns;
-    return astray(later_ns, interval_ns) < astray(guess_ns, interval_ns) ? later_ns : guess_ns;
+    Nanoseconds delay_ns = median_of(delays);
+    std::size_t least = astray(delay_ns);
+    for (std::size_t next = astray(delay_ns + interval_ns_); next < least;
+         next = astray(delay_ns + interval_ns_)) {
+      delay_ns += interval_ns_;
+      least = next;
+    }
+    return delay_ns;
   }
 
   /// Scans that no sweep is near.
-  std::size_t astray(Nanoseconds delay_ns, Nanoseconds interval_ns) const {
+  std::size_t astray(Nanoseconds delay_ns) const {
     std::size_t count = 0;
     for (std::size_t i = first_scan(); i < there_.scans.size(); ++i) {
       const Nanoseconds expected_ns = stamp_ns(i) + delay_ns;
-      const Nanoseconds off_ns = there_.sweeps[nearest(expected_ns)].arrival_ns - expected_ns;
-      count += 2 * std::abs(off_ns) > interval_ns ? 1 : 0;
+      const Nanoseconds off_ns = due_ns_[nearest(expected_ns)] - expected_ns;
+      count += 2 * std::abs(off_ns) > interval_ns_ ? 1 : 0;
     }
     return count;
   }
 
-  std::size_t nearest(Nanoseconds arrival_ns) const {
-    const auto after = not_before(arrival_ns);
-    if (after == there_.sweeps.begin()) {
+  std::size_t nearest(Nanoseconds expected_ns) const {
+    const auto after = not_before(expected_ns);
+    if (after == due_ns_.begin()) {
       return 0;
     }
     const auto before = std::prev(after);
-    const bool earlier = after == there_.sweeps.end() ||
-                         arrival_ns - before->arrival_ns <= after->arrival_ns - arrival_ns;
-    return static_cast<std::size_t>((earlier ? before : after) - there_.sweeps.begin());
+    const bool earlier = after == due_ns_.end() || expected_ns - *before <= *after - expected_ns;
+    return static_cast<std::size_t>((earlier ? before : after) - due_ns_.begin());
   }
 
   /// One scan for each sweep, where two are on neighbours.
@@ -145,18 +166,41 @@ class Answers {
   }
 
   const SweepsAndScans& there_;
+  std::vector<Nanoseconds> due_ns_;
+  Nanoseconds interval_ns_;
   std::vector<std::optional<std::size_t>> scan_of_;
 };
 
-/// How many sweeps had been refused at each scan. What was received and not used was refused, or
-/// still waited; so the least of this from a scan on is an upper bound, met when nothing waits.
+std::uint64_t less(std::uint64_t from, std::uint64_t what) {
+  return from - std::min(from, what);
+}
+
+/// Scans up to each one that were refused although they have a row: with too few matches. A mapper
+/// that counts from zero again begins with those of its own.
+std::vector<std::uint64_t> refused_with_row(const std::vector<exporter::LoggedScan>& scans) {
+  std::vector<std::uint64_t> refused;
+  std::uint64_t used = 0;
+  for (const exporter::LoggedScan& scan : scans) {
+    const bool anew = scan.status.scans_used < used;
+    const bool unused = scan.status.scans_used == (anew ? 0 : used);
+    refused.push_back((anew || refused.empty() ? 0 : refused.back()) + (unused ? 1 : 0));
+    used = scan.status.scans_used;
+  }
+  return refused;
+}
+
+/// How many sweeps without a row had been refused, at each scan and (last) at the end. What was
+/// received and not used was refused, or still waited; so the least of this from a scan on is an
+/// upper bound, met when nothing waits.
 std::vector<std::uint64_t> refused_until(const SweepsAndScans& there) {
-  std::vector<std::uint64_t> refused(there.scans.size());
-  std::uint64_t least = there.refused.value_or(std::numeric_limits<std::uint64_t>::max());
+  const std::vector<std::uint64_t> with_row = refused_with_row(there.scans);
+  std::vector<std::uint64_t> refused(there.scans.size() + 1);
+  std::uint64_t least = there.refused ? less(*there.refused, with_row.empty() ? 0 : with_row.back())
+                                      : std::numeric_limits<std::uint64_t>::max();
+  refused.back() = least;
   for (std::size_t i = there.scans.size(); i-- > 0;) {
     const LioStatus& status = there.scans[i].status;
-    least =
-        std::min(least, status.scans_received - std::min(status.scans_received, status.scans_used));
+    least = std::min(least, less(less(status.scans_received, status.scans_used), with_row[i]));
     refused[i] = least;
   }
   return refused;
@@ -200,24 +244,23 @@ class GapFinder {
         return refused_[*scan];
       }
     }
-    return there_.refused.value_or(refused_before_);
+    return there_.refused ? refused_.back() : refused_before_;
   }
 
   void add(std::size_t sweep) {
-    gap_.first_ns = gap_.scans == 0 ? arrival_ns(sweep) : gap_.first_ns;
+    gap_.first_ns = gap_.first_ns.value_or(arrival_ns(sweep));
     gap_.newest_ns = arrival_ns(sweep);
     ++gap_.scans;
   }
 
   /// `refused_now`: from the beginning to the end of the gap.
   void close(std::uint64_t refused_now) {
-    const std::uint64_t here =
-        std::min(gap_.scans, refused_now - std::min(refused_now, refused_before_));
-    refused_before_ += here;
-    gap_.scans -= here;
+    gap_.refused = std::min(gap_.scans, less(refused_now, refused_before_));
+    refused_before_ += gap_.refused;
+    gap_.scans -= gap_.refused;
     if (gap_.scans > 0) {
-      gap_.silence_s = to_seconds(gap_.before_ns.value_or(gap_.newest_ns) -
-                                  gap_.after_ns.value_or(gap_.first_ns));
+      gap_.silence_s = to_seconds(gap_.before_ns.value_or(*gap_.newest_ns) -
+                                  gap_.after_ns.value_or(*gap_.first_ns));
       missed_.push_back(gap_);
     }
     gap_ = {};
@@ -231,13 +274,14 @@ class GapFinder {
   std::vector<MissedScans> missed_;
 };
 
+/// Where the beginning or the end is missing the arrivals are known.
 std::string where(const MissedScans& gap) {
   const std::string from = gap.after_ns ? exporter::stamp_text(*gap.after_ns)
                            : gap.before_ns
-                               ? "the first one at " + exporter::stamp_text(gap.first_ns)
-                               : exporter::stamp_text(gap.first_ns);
+                               ? "the first one at " + exporter::stamp_text(*gap.first_ns)
+                               : exporter::stamp_text(*gap.first_ns);
   const std::string to = gap.before_ns ? exporter::stamp_text(*gap.before_ns)
-                                       : "the last one at " + exporter::stamp_text(gap.newest_ns);
+                                       : "the last one at " + exporter::stamp_text(*gap.newest_ns);
   return "between " + from + " and " + to + " (" + fixed(gap.silence_s, 2) + " s)";
 }
 
@@ -254,6 +298,45 @@ std::optional<std::uint64_t> refused_by_mapper(const SessionData& data) {
     return refused;
   }
   return std::nullopt;
+}
+
+/// What the mapper counted at its end goes beyond what may have been refused at the newest scan.
+bool refused_after_newest_scan(const SessionData& data) {
+  const auto refused = refused_by_mapper(data);
+  if (!refused || data.scans.empty()) {
+    return false;
+  }
+  const LioStatus& newest = data.scans.back().status;
+  return *refused > less(newest.scans_received, newest.scans_used);
+}
+
+bool was_mapper_restarted(const SessionData& data) {
+  return std::any_of(data.restarts.begin(), data.restarts.end(), [](const Restart& restart) {
+    return restart.restarted && restart.program.find("lio_mapper") != std::string::npos;
+  });
+}
+
+/// The longest ones, in order of time.
+std::string list_of(const std::vector<MissedScans>& missed) {
+  std::vector<std::size_t> shown(missed.size());
+  std::iota(shown.begin(), shown.end(), std::size_t{0});
+  std::stable_sort(shown.begin(), shown.end(), [&](std::size_t a, std::size_t b) {
+    return missed[a].scans > missed[b].scans;
+  });
+  std::uint64_t scans_of_more = 0;
+  for (std::size_t i = kListed; i < shown.size(); ++i) {
+    scans_of_more += missed[shown[i]].scans;
+  }
+  shown.resize(std::min(shown.size(), kListed));
+  std::sort(shown.begin(), shown.end());
+  std::string list;
+  for (const std::size_t i : shown) {
+    list += "- " + std::to_string(missed[i].scans) + " " + where(missed[i]) + "\n";
+  }
+  return missed.size() <= kListed ? list
+                                  : list + "- and " + std::to_string(missed.size() - kListed) +
+                                        " more stretches, none longer, with " +
+                                        std::to_string(scans_of_more) + " together\n";
 }
 
 }  // namespace
@@ -278,9 +361,10 @@ std::vector<MissedScans> find_missed_scans(const std::vector<exporter::LoggedSca
       missed.push_back({scans[i].status.stamp_ns,
                         scans[i + 1].status.stamp_ns,
                         static_cast<std::uint64_t>(std::llround(intervals_s[i] / usual_s)) - 1,
-                        intervals_s[i],
                         0,
-                        0});
+                        intervals_s[i],
+                        std::nullopt,
+                        std::nullopt});
     }
   }
   return missed;
@@ -300,11 +384,10 @@ std::vector<MissedScans> missed_scans_of(const SessionData& data) {
 
 std::string print_missed(const SessionData& data, const std::vector<MissedScans>& missed) {
   std::uint64_t sum = 0;
-  std::string list;
   for (const MissedScans& gap : missed) {
     sum += gap.scans;
-    list += "- " + std::to_string(gap.scans) + " " + where(gap) + "\n";
   }
+  const std::string list = list_of(missed);
   const std::string of = data.sweeps.empty()
                              ? ", by their usual interval: which sweeps there were nobody wrote "
                                "down, so what is missing at the beginning or the end does not show"
@@ -318,7 +401,13 @@ std::string lost_end(const SessionData& data, const std::vector<MissedScans>& mi
       missed.back().newest_ns != data.sweeps.back().arrival_ns) {
     return "";
   }
+  const bool was_there = refused_after_newest_scan(data);
+  if (was_there && was_mapper_restarted(data)) {
+    return "";
+  }
   const MissedScans& end = missed.back();
+  const double missing_s =
+      static_cast<double>(end.scans) * to_seconds(usual_interval_ns(data.sweeps));
   const Breaks begins = data.run_begins();
   const auto of_last_drive =
       std::count_if(data.sweeps.begin(), data.sweeps.end(), [&](const auto& sweep) {
@@ -326,16 +415,20 @@ std::string lost_end(const SessionData& data, const std::vector<MissedScans>& mi
       });
   const double share_of_drive = static_cast<double>(end.scans) /
                                 static_cast<double>(std::max<std::ptrdiff_t>(1, of_last_drive));
-  const bool considerable = end.silence_s > kRestart_s ||
-                            (end.silence_s > kOnItsWay_s && share_of_drive >= kConsiderableShare);
+  const bool considerable =
+      missing_s > kRestart_s || (missing_s > kOnItsWay_s && share_of_drive >= kConsiderableShare);
   if (!considerable) {
     return "";
   }
+  const std::string when =
+      (end.refused > 0 ? fixed(missing_s, 1) + " s of the last " : std::string("the last ")) +
+      fixed(end.silence_s, 1) + " s: ";
+  const std::string why = was_there
+                              ? "it was there to the end, and did not receive them or was behind"
+                              : "it did not come back before the end, or was that far behind";
   return std::to_string(end.scans) + " of " + std::to_string(of_last_drive) +
          " sweeps were never answered by the mapper, " +
-         (end.after_ns ? "the last " + fixed(end.silence_s, 1) +
-                             " s: it did not come back before the end, or was that far behind"
-                       : std::string("from the first to the last")) +
+         (end.after_ns ? when + why : std::string("from the first to the last")) +
          ". What was driven then is not in the map.";
 }
 

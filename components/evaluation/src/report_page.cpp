@@ -87,11 +87,13 @@ std::string tiles(const SessionData& data, const PageContent& content) {
     double data_s = 0.0;
     double wall_s = 0.0;
     for (const exporter::RunInfo& run : data.runs()) {
-      data_s += run.data_s;
+      data_s += run.wall_s > 0.0 ? run.data_s : 0.0;
       wall_s += run.wall_s;
     }
-    text +=
-        tile(fixed(data_s / wall_s, 2) + " x", "real time", fixed(wall_s, 1) + " s of processing");
+    text += wall_s > 0.0 ? tile(fixed(data_s / wall_s, 2) + " x",
+                                "real time",
+                                fixed(wall_s, 1) + " s of processing")
+                         : tile("-", "real time", "not known: the run was killed");
   }
   return "<div class=\"tiles\">\n" + text + "</div>\n";
 }
@@ -166,8 +168,9 @@ std::vector<Part> parts_of(const SessionData& data,
 std::string subtitle(const SessionData& data) {
   std::string text;
   if (data.run) {
-    text = "Log " + data.run->log + ", " + fixed(data.run->data_s, 1) + " s; gate mode " +
-           data.run->mode + ", GPS filter " + data.run->gps_filter + ". ";
+    text = "Log " + data.run->log +
+           (data.run->data_s > 0.0 ? ", " + fixed(data.run->data_s, 1) + " s" : std::string()) +
+           "; gate mode " + data.run->mode + ", GPS filter " + data.run->gps_filter + ". ";
   }
   return text + "t = 0 is " + exporter::stamp_text(data.span().begin_ns) +
          " s of the sensors' time.";

@@ -148,7 +148,15 @@ std::string how_text(const exporter::RunInfo& run) {
          "`, GPS filter `" + run.gps_filter + "`";
 }
 
+/// A run that was killed has not written how long it was.
+std::string data_text(double data_s) {
+  return data_s > 0.0 ? fixed(data_s, 1) + " s" : "how long is not known";
+}
+
 std::string pace_text(double data_s, double wall_s) {
+  if (!(wall_s > 0.0)) {
+    return "not known";
+  }
   return fixed(wall_s, 1) + " s, " + fixed(data_s / wall_s, 2) + " times real time";
 }
 
@@ -159,22 +167,25 @@ std::string print_runs(const std::vector<exporter::RunInfo>& runs) {
   }
   if (runs.size() == 1) {
     const exporter::RunInfo& run = runs.front();
-    return "- Log: `" + run.log + "`, " + fixed(run.data_s, 1) + " s\n- Run: " + how_text(run) +
+    return "- Log: `" + run.log + "`, " + data_text(run.data_s) + "\n- Run: " + how_text(run) +
            "\n- Processing time: " + pace_text(run.data_s, run.wall_s) + "\n";
   }
   std::string text = "- Logs, of which each went on with what was there:\n";
   double data_s = 0.0;
   double wall_s = 0.0;
+  bool all_known = true;
   for (const exporter::RunInfo& run : runs) {
-    data_s += run.data_s;
+    data_s += run.wall_s > 0.0 ? run.data_s : 0.0;
     wall_s += run.wall_s;
+    all_known = all_known && run.wall_s > 0.0;
     text += "  - `" + run.log + "`";
     text += run.how.empty() ? ""
-                            : ", " + fixed(run.data_s, 1) + " s: " + how_text(run) +
+                            : ", " + data_text(run.data_s) + ": " + how_text(run) +
                                   "; processing time " + pace_text(run.data_s, run.wall_s);
     text += run.interrupted ? ", interrupted by the user\n" : "\n";
   }
-  return text + "- Processing time in all: " + pace_text(data_s, wall_s) + "\n";
+  return text + "- Processing time in all: " + pace_text(data_s, wall_s) +
+         (all_known ? "\n" : " (without the runs of which it is not known)\n");
 }
 
 }  // namespace

@@ -273,8 +273,8 @@ Breaks SessionData::run_begins() const {
   Breaks begins;
   const std::vector<exporter::RunInfo> all = runs();
   for (std::size_t i = 1; i < all.size(); ++i) {
-    if (all[i].begin_ns != 0) {
-      begins.push_back(all[i].begin_ns);
+    if (all[i].begin_ns) {
+      begins.push_back(*all[i].begin_ns);
     }
   }
   std::sort(begins.begin(), begins.end());

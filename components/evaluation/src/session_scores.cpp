@@ -41,8 +41,8 @@ std::string print_runs_without_truth(const SessionData& data) {
   for (std::size_t i = 0; runs.size() > 1 && !data.truth.empty() && i < runs.size(); ++i) {
     const bool is_last = i + 1 == runs.size();
     const auto is_of_run = [&](const exporter::StampedPose& pose) {
-      return (i == 0 || pose.stamp_ns >= runs[i].begin_ns) &&
-             (is_last || pose.stamp_ns < runs[i + 1].begin_ns);
+      return (i == 0 || !runs[i].begin_ns || pose.stamp_ns >= *runs[i].begin_ns) &&
+             (is_last || !runs[i + 1].begin_ns || pose.stamp_ns < *runs[i + 1].begin_ns);
     };
     if (std::none_of(data.truth.begin(), data.truth.end(), is_of_run)) {
       text += "**" + std::string(file::kTruth) + " holds nothing of the run of `" + runs[i].log +

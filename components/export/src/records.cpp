@@ -251,9 +251,9 @@ std::string run_text(const RunInfo& run, const std::string& indent) {
                      line("mode", quoted(run.mode)) + line("gps_filter", quoted(run.gps_filter)) +
                      line("data_s", number_text(run.data_s)) +
                      line("wall_s", number_text(run.wall_s));
-  if (run.begin_ns != 0) {
-    text +=
-        line("begin_ns", std::to_string(run.begin_ns)) + line("end_ns", std::to_string(run.end_ns));
+  if (run.begin_ns && run.end_ns) {
+    text += line("begin_ns", std::to_string(*run.begin_ns)) +
+            line("end_ns", std::to_string(*run.end_ns));
   }
   return text + (run.interrupted ? line("interrupted", "true") : "");
 }

@@ -17,6 +17,8 @@
 
 #include <chrono>
 #include <optional>
+#include <stdexcept>
+#include <string>
 
 namespace {
 
@@ -61,9 +63,8 @@ class Process {
     if (!options.session.empty()) {
       exporter::create_session_folder(options.session);
       session_.emplace(options.session, exporter::Opening::kContinue);
-      if (const auto stored = pipeline::stored_datum(options.session)) {
-        adopt(*stored);
-      }
+      log_(session_->take_events());
+      adopt_stored_datum(options.session);
     }
     subscribe_to_sensors(settings.robot, loop);
     subscribe_to_headings(settings.robot, loop);
@@ -150,6 +151,17 @@ class Process {
     mapper_aligned_ = status.aligned;
     mapper_heard_ = true;
     take(core_.on_lio_status(status));
+  }
+
+  /// A damaged one (a power failure leaves empty files) is heard again from the GPS filter.
+  void adopt_stored_datum(const std::string& session) {
+    try {
+      if (const auto stored = pipeline::stored_datum(session)) {
+        adopt(*stored);
+      }
+    } catch (const std::runtime_error& damaged) {
+      log_.warning(std::string(damaged.what()) + "; going on as if it had not been there");
+    }
   }
 
   void adopt(const Datum& datum) {

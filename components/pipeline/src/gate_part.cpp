@@ -3,6 +3,8 @@
 #include "trigpoint/pipeline/session_parts.hpp"
 
 #include <filesystem>
+#include <stdexcept>
+#include <utility>
 
 namespace trigpoint::pipeline {
 
@@ -13,17 +15,40 @@ namespace {
 
 constexpr double kRewriteAfter_s = 3.0;
 
+Event warning_of(const std::runtime_error& damaged, const std::string& what) {
+  return {Severity::kWarning, 0, "session_file_damaged", std::string(damaged.what()) + "; " + what};
+}
+
+exporter::CountsWriter open_counts(const std::string& session,
+                                   exporter::Opening opening,
+                                   Events& events) {
+  try {
+    return {session, "fusion_gate", opening};
+  } catch (const std::runtime_error& damaged) {
+    events.push_back(warning_of(damaged, "the gate's counts begin anew"));
+    return {session, "fusion_gate", exporter::Opening::kFresh};
+  }
+}
+
 }  // namespace
 
 GatePart::GatePart(const std::string& session, exporter::Opening opening)
     : session_(session),
       trajectory_(path_in(session, file::kFused), "base_link in map, as published online", opening),
       gate_log_(path_in(session, file::kGate), opening),
-      counts_(session, "fusion_gate", opening) {
+      counts_(open_counts(session, opening, events_)) {
   const std::string alignment = path_in(session, file::kAlignment);
   if (opening == exporter::Opening::kContinue && std::filesystem::exists(alignment)) {
-    newest_alignment_ = written_alignment_ = exporter::read_alignment(alignment);
+    try {
+      newest_alignment_ = written_alignment_ = exporter::read_alignment(alignment);
+    } catch (const std::runtime_error& damaged) {
+      events_.push_back(warning_of(damaged, "going on as if it had not been there"));
+    }
   }
+}
+
+Events GatePart::take_events() {
+  return std::exchange(events_, {});
 }
 
 void GatePart::on_fused(const Odometry& odometry) {
@@ -39,8 +64,12 @@ void GatePart::on_alignment(const std::optional<Alignment>& best, bool admitted)
   const bool was_admitted =
       newest_alignment_ && (newest_alignment_->admitted || newest_alignment_->was_admitted);
   if (best && exporter::is_known(*best)) {
-    newest_alignment_ = {
-        *best, admitted, admitted ? "" : "not admitted by the gate", was_admitted && !admitted};
+    newest_alignment_ = {*best,
+                         admitted,
+                         admitted       ? ""
+                         : was_admitted ? "not admitted by the gate; one before it was"
+                                        : "not admitted by the gate",
+                         was_admitted && !admitted};
   } else if (newest_alignment_ && newest_alignment_->admitted) {
     newest_alignment_->admitted = false;
     newest_alignment_->was_admitted = true;

@@ -2,12 +2,8 @@
 // Copyright the Trigpoint developers
 #include "trigpoint/pipeline/session_parts.hpp"
 
-#include <algorithm>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <limits>
-#include <sstream>
+#include <stdexcept>
 #include <variant>
 
 namespace trigpoint::pipeline {
@@ -17,43 +13,19 @@ using exporter::path_in;
 
 namespace {
 
-/// The lines of `file` whose poses are later than `after_ns`.
-std::string poses_after(const std::string& file, Nanoseconds after_ns) {
-  const exporter::Trajectory poses = exporter::read_trajectory(file);  // strict
-  const auto first = std::find_if(
-      poses.begin(), poses.end(), [&](const auto& pose) { return pose.stamp_ns > after_ns; });
-  auto passed_over = std::distance(poses.begin(), first);
-  std::string text;
-  std::ifstream in(file);
-  for (std::string line; std::getline(in, line) && !in.eof();) {
-    if (line.empty() || line.starts_with('#')) {
-      continue;
-    }
-    if (passed_over-- <= 0) {
-      text += line + "\n";
-    }
-  }
-  return text;
-}
-
-/// Nothing is appended from `map` at another datum.
-void append_truth(const std::string& from, const std::string& kept) {
+/// What `from` has after the newest pose of `kept`; nothing when its `map` is at another datum.
+exporter::Trajectory later_truth(const std::string& from, const std::string& kept) {
   const auto old_datum = exporter::datum_named_in(kept);
   const auto new_datum = exporter::datum_named_in(from);
   if (old_datum && new_datum && old_datum->id() != new_datum->id()) {
-    return;
+    return {};
   }
   const exporter::Trajectory old = exporter::read_trajectory(kept);
-  const std::string later = poses_after(
-      from, old.empty() ? std::numeric_limits<Nanoseconds>::min() : old.back().stamp_ns);
-  if (later.empty()) {
-    return;
-  }
-  std::ostringstream text;
-  text << std::ifstream(kept).rdbuf();
-  std::string whole = std::move(text).str();
-  whole.resize(whole.rfind('\n') + 1);  // what a writer that died has left of a line
-  exporter::write_text(kept, whole + later);
+  exporter::Trajectory later = exporter::read_trajectory(from);
+  std::erase_if(later, [&](const exporter::StampedPose& pose) {
+    return !old.empty() && pose.stamp_ns <= old.back().stamp_ns;
+  });
+  return later;
 }
 
 }  // namespace
@@ -66,9 +38,7 @@ LogPart::LogPart(const std::string& session, exporter::Opening opening)
       counts_(session, "log", opening) {}
 
 void LogPart::on_entry(const recording::LogEntry& entry) {
-  if (first_ns_ == 0) {
-    first_ns_ = entry.receive_ns;
-  }
+  first_ns_ = first_ns_.value_or(entry.receive_ns);
   last_ns_ = entry.receive_ns;
   if (const auto* fix = std::get_if<GnssFix>(&entry.measurement)) {
     fixes_.append(*fix, entry.receive_ns, entry.withheld);
@@ -86,20 +56,37 @@ void LogPart::on_entry(const recording::LogEntry& entry) {
 
 void LogPart::on_imu(Moment sample) {
   ++imu_;
-  begin_ns_ = begin_ns_ == 0 ? sample.stamp_ns : begin_ns_;
+  begin_ns_ = begin_ns_.value_or(sample.stamp_ns);
   newest_imu_ = sample;
+  for (const Moment& sweep : early_sweeps_) {
+    write(sweep, sample);
+  }
+  early_sweeps_.clear();
 }
 
 void LogPart::on_sweep(Moment sweep) {
   ++sweeps_;
-  const bool clock_known = newest_imu_.stamp_ns != 0;
-  sweep_log_.append({sweep.stamp_ns,
-                     sweep.receive_ns,
-                     clock_known ? newest_imu_.stamp_ns + sweep.receive_ns - newest_imu_.receive_ns
-                                 : sweep.stamp_ns});
+  if (newest_imu_) {
+    write(sweep, *newest_imu_);
+  } else {
+    early_sweeps_.push_back(sweep);
+  }
+}
+
+void LogPart::write(Moment sweep, Moment imu) {
+  sweep_log_.append(
+      {sweep.stamp_ns, sweep.receive_ns, imu.stamp_ns + sweep.receive_ns - imu.receive_ns});
+}
+
+double LogPart::data_s() const {
+  return first_ns_ && last_ns_ ? to_seconds(*last_ns_ - *first_ns_) : 0.0;
 }
 
 void LogPart::close(const recording::LogReader& log) {
+  for (const Moment& sweep : early_sweeps_) {  // no IMU, so no estimates: any clock does
+    write(sweep, {sweep.receive_ns, sweep.receive_ns});
+  }
+  early_sweeps_.clear();
   const auto undecodable = [&](const std::string& input) {
     std::uint64_t count = 0;
     for (const recording::Undecodable& skipped : log.undecodable()) {
@@ -132,17 +119,33 @@ void LogPart::close(const recording::LogReader& log) {
   counts_.write(counts);
 }
 
-void LogPart::keep_truth(const recording::LogReader& log) const {
+std::optional<Event> LogPart::keep_truth(const recording::LogReader& log) const {
   const std::string kept = path_in(session_, file::kTruth);
   const auto truth = log.truth_file();
   if (!truth || *truth == kept) {
-    return;
+    return std::nullopt;
   }
-  if (opening_ == exporter::Opening::kContinue && std::filesystem::exists(kept)) {
-    append_truth(*truth, kept);
-  } else {
+  if (opening_ != exporter::Opening::kContinue || !std::filesystem::exists(kept)) {
     exporter::copy_file(*truth, kept);
+    return std::nullopt;
   }
+  exporter::Trajectory later;
+  try {
+    later = later_truth(*truth, kept);
+  } catch (const std::runtime_error& damaged) {
+    return Event{Severity::kWarning,
+                 last_ns_.value_or(0),
+                 "truth_left_out",
+                 std::string(damaged.what()) + "; nothing of " + *truth + " is added to " + kept +
+                     ", and what was driven is not scored against it"};
+  }
+  if (!later.empty()) {
+    exporter::TrajectoryWriter writer(kept, "base_link in map", exporter::Opening::kContinue);
+    for (const exporter::StampedPose& pose : later) {
+      writer.append(pose.stamp_ns, pose.pose);
+    }
+  }
+  return std::nullopt;
 }
 
 }  // namespace trigpoint::pipeline

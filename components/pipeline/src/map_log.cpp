@@ -81,8 +81,10 @@ class MapRun {
     }
     session_.emplace(options_.session, options_.use);
     session_->correct_past_of(cores_, options_.use);
+    if (const auto left_out = session_->keep_truth(log)) {
+      tell({*left_out}, options_.on_event);
+    }
     exporter::write_text(session_->path(file::kConfig), options_.config_text);
-    session_->keep_truth(log);
     start_ = Clock::now();
     write_run();  // a run that is killed says at least what it was
   }
@@ -92,7 +94,7 @@ class MapRun {
       entry.withheld = withholding_.withholds(fix->stamp_ns) || entry.withheld;
     }
     session_->on_entry(entry);
-    if (const Nanoseconds begin_ns = session_->log().begin_ns(); begin_ns != begin_ns_) {
+    if (const auto begin_ns = session_->log().begin_ns(); begin_ns != begin_ns_) {
       begin_ns_ = begin_ns;
       write_run();  // so that one that is killed says where it begins
     }
@@ -112,7 +114,7 @@ class MapRun {
     const bool resumed = options_.stored && options_.use == UseOfStored::kResume;
     result_.sweeps_used = cores_.lio_status().scans_used -
                           (resumed ? options_.stored->checkpoint.scans_used : std::uint64_t{0});
-    result_.data_s = to_seconds(session_->log().last_ns() - session_->log().first_ns());
+    result_.data_s = session_->log().data_s();
     result_.wall_s = milliseconds_since(start_) * 1e-3;
     write_run();
     return result_;
@@ -158,7 +160,7 @@ class MapRun {
   recording::FixWithholding withholding_;
   std::optional<OfflineSession> session_;
   std::vector<exporter::RunInfo> before_;  ///< of a session that goes on
-  Nanoseconds begin_ns_{0};                ///< of the IMU's first stamp
+  std::optional<Nanoseconds> begin_ns_;    ///< of the IMU's first stamp
   Clock::time_point start_;
   MapLogResult result_;
 };

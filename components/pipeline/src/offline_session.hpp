@@ -33,7 +33,9 @@ class OfflineSession {
 
   void close(Lockstep& cores, const recording::LogReader& log);
 
-  void keep_truth(const recording::LogReader& log) const { log_.keep_truth(log); }
+  [[nodiscard]] std::optional<Event> keep_truth(const recording::LogReader& log) const {
+    return log_.keep_truth(log);
+  }
 
   const LogPart& log() const { return log_; }
 

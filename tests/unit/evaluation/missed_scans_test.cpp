@@ -6,15 +6,18 @@
 
 #include "../export/scratch_folder.hpp"
 #include "made_session.hpp"
+#include "session_data.hpp"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 
 namespace trigpoint::evaluation {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -127,6 +130,38 @@ TEST(UnansweredSweeps, are_not_explained_by_what_waits) {
   EXPECT_EQ(missed[0].scans, 7U);
 }
 
+/// A fast LiDAR behind a slow driver: its sweeps arrive more than two intervals after their end.
+TEST(UnansweredSweeps, are_none_when_every_sweep_comes_late_by_more_than_an_interval) {
+  const auto all = [](int) { return true; };
+  EXPECT_THAT(missed_in(drive(100, all, [](int) { return Nanoseconds{250'000'000}; })), IsEmpty());
+  EXPECT_THAT(missed_in(drive(100, all, [](int) { return Nanoseconds{420'000'000}; })), IsEmpty());
+}
+
+/// A network that stalls for 0.9 s and then delivers ten sweeps at one moment.
+TEST(UnansweredSweeps, are_not_those_that_came_in_a_burst) {
+  const auto stalled = [](int k) {
+    return Nanoseconds{3'000'000} + (k >= 60 && k < 69 ? (69 - k) * kInterval_ns : 0);
+  };
+  EXPECT_THAT(missed_in(drive(
+                  100, [](int) { return true; }, stalled)),
+              IsEmpty());
+  const auto missed = missed_in(drive(
+      100, [](int k) { return k < 40 || k >= 47; }, stalled));
+  ASSERT_EQ(missed.size(), 1U);
+  EXPECT_EQ(missed[0].scans, 7U);
+}
+
+/// A scan with too few matches is refused and has a row: it explains no other one.
+TEST(UnansweredSweeps, are_not_explained_by_a_refused_scan_that_has_a_row) {
+  Drive made = drive(100, [](int k) { return k < 40 || k >= 47; });
+  for (std::size_t i = 40; i < made.scans.size(); ++i) {
+    made.scans[i].status.scans_used -= 1;
+  }
+  const auto missed = missed_in(made, 1);
+  ASSERT_EQ(missed.size(), 1U);
+  EXPECT_EQ(missed[0].scans, 7U);
+}
+
 TEST(UnansweredSweeps, of_two_days_are_not_what_lies_between_them) {
   Drive made = drive(50, [](int k) { return k < 48; });
   const Nanoseconds day_ns = 86'400 * kNanosecondsPerSecond;
@@ -163,8 +198,8 @@ TEST(Restarts, count_the_scans_missed_by_the_usual_interval) {
   EXPECT_EQ(find_missed_scans(scans, {1'800'000'000}).size(), 1U);  // another day begins
 }
 
-/// The made session with a mapper that was started again and answered no sweep after `last`.
-ReportResult report_of_lost_end(const ScratchFolder& folder, int last) {
+/// The made session with a mapper that answered no sweep after `last`.
+void make_lost_end(const ScratchFolder& folder, int last) {
   test::make_session(folder.path());
   exporter::SweepLog sweeps(folder.file("sweeps.csv"));
   exporter::ScanLog scans(folder.file("scans.csv"));
@@ -179,9 +214,26 @@ ReportResult report_of_lost_end(const ScratchFolder& folder, int last) {
       scans.append(status, 4000);
     }
   }
+}
+
+void write_restart(const ScratchFolder& folder) {
   write_all(folder.file("restarts.csv"),
             "unix_s,program,restarted,lived_s,what\n"
             "1700000000,trigpoint_lio_mapper,1,23.1,\"was killed by signal 9 (Killed)\"\n");
+}
+
+/// Refused for `no_points`, as the mapper counted when it ended.
+void write_refused(const ScratchFolder& folder, std::uint64_t used, std::uint64_t refused) {
+  exporter::CountsWriter(folder.path(), "lio_mapper")
+      .write({{"points.received", used + refused},
+              {"points.used", used},
+              {"points.refused.no_points", refused}});
+}
+
+/// And was started again.
+ReportResult report_of_lost_end(const ScratchFolder& folder, int last) {
+  make_lost_end(folder, last);
+  write_restart(folder);
   return write_report(folder.path(), kTextOnly);
 }
 
@@ -203,6 +255,56 @@ TEST(Report, lists_what_a_restart_at_the_end_costs_and_does_not_fail_for_it) {
   const ReportResult result = report_of_lost_end(folder, test::kScans - 12);
   EXPECT_THAT(result.failures, IsEmpty());
   EXPECT_THAT(result.text, HasSubstr("Scans missed: 12 of the 1201 sweeps"));
+}
+
+/// The LiDAR gives empty clouds for the last 10 s, and one sweep is not counted.
+TEST(Report, does_not_take_refused_sweeps_at_the_end_for_a_mapper_that_is_gone) {
+  const ScratchFolder folder;
+  make_lost_end(folder, test::kScans - 101);
+  write_refused(folder, test::kScans - 100, 100);
+  const ReportResult result = write_report(folder.path(), kTextOnly);
+  EXPECT_THAT(result.failures, Not(Contains(HasSubstr("never answered"))));
+  EXPECT_THAT(result.text, HasSubstr("Scans missed: 1 of the 1201 sweeps"));
+}
+
+/// Empty clouds from 60 s on; the mapper dies at 75 s, and what it had refused dies with it.
+TEST(Report, does_not_fail_for_what_a_mapper_refused_that_died_when_the_next_one_came_back) {
+  const ScratchFolder folder;
+  make_lost_end(folder, 600);
+  write_refused(folder, 601, 450);
+  write_restart(folder);
+  const ReportResult result = write_report(folder.path(), kTextOnly);
+  EXPECT_THAT(result.failures, Not(Contains(HasSubstr("never answered"))));
+  EXPECT_THAT(result.text, HasSubstr("Scans missed: 150 of the 1201 sweeps"));
+}
+
+TEST(Report, fails_when_a_mapper_that_was_there_did_not_answer_at_the_end) {
+  const ScratchFolder folder;
+  make_lost_end(folder, 600);
+  write_refused(folder, 601, 450);
+  const ReportResult result = write_report(folder.path(), kTextOnly);
+  EXPECT_THAT(result.failures,
+              Contains(AllOf(HasSubstr("150 of 1201 sweeps were never answered"),
+                             HasSubstr("15.0 s of the last 60.0 s"),
+                             HasSubstr("it was there to the end"),
+                             Not(HasSubstr("did not come back")))));
+}
+
+TEST(Report, lists_the_longest_stretches_of_missed_scans_and_counts_the_others) {
+  std::vector<MissedScans> missed;
+  for (std::uint64_t i = 0; i < 30; ++i) {
+    MissedScans& gap = missed.emplace_back();
+    gap.scans = i % 3 == 0 ? 5 : 2;
+    gap.after_ns = kStart_ns + static_cast<Nanoseconds>(i) * kNanosecondsPerSecond;
+    gap.before_ns = *gap.after_ns + kInterval_ns;
+  }
+  const std::string text = print_missed(SessionData{}, missed);
+  EXPECT_THAT(text,
+              AllOf(HasSubstr("Scans missed: 90"),
+                    HasSubstr("- 5 between 1700000027"),
+                    HasSubstr("- 2 between 1700000001"),
+                    HasSubstr("- and 10 more stretches, none longer, with 20 together")));
+  EXPECT_EQ(std::count(text.begin(), text.end(), '-'), 21);
 }
 
 TEST(Report, tells_missed_scans_also_without_a_restart) {

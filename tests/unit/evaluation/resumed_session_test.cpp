@@ -96,6 +96,22 @@ TEST(ResumedSession, sums_distances_and_times_within_each_day) {
   EXPECT_THAT(page, AllOf(HasSubstr("<small>130.0 s</small>"), HasSubstr("of 91 seen")));
 }
 
+/// Its run.yaml is that of its beginning: without durations.
+TEST(KilledRun, has_no_pace) {
+  const ScratchFolder folder;
+  test::make_session(folder.path());
+  auto run = exporter::read_run(folder.file("run.yaml"));
+  run.data_s = run.wall_s = 0.0;
+  exporter::write_run(folder.file("run.yaml"), run);
+  const std::string text = write_report(folder.path(), kTextAndPage).text;
+  EXPECT_THAT(text, AllOf(HasSubstr("Processing time: not known"), Not(HasSubstr("0.0 s\n"))));
+  const std::string page = trigpoint::test::read_all(folder.file("report.html"));
+  EXPECT_THAT(page, AllOf(HasSubstr("not known: the run was killed"), Not(HasSubstr("<b>- x<"))));
+  add_day_two(folder.path(), true);
+  EXPECT_THAT(write_report(folder.path(), kTextAndPage).text,
+              HasSubstr("in all: 5.0 s, 2.00 times real time (without the runs of which"));
+}
+
 TEST(ResumedSession, counts_no_way_between_two_odom_epochs) {
   const ScratchFolder folder;
   test::make_session(folder.path());

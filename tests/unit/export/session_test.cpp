@@ -253,7 +253,7 @@ TEST(RunInfo, keeps_what_was_run_before_the_session_was_resumed) {
   EXPECT_EQ(runs[0].begin_ns, first.begin_ns);
   EXPECT_EQ(runs[0].end_ns, first.end_ns);
   EXPECT_EQ(runs[1].log, second.log);
-  EXPECT_EQ(runs[1].begin_ns, 0);
+  EXPECT_FALSE(runs[1].begin_ns);
   EXPECT_EQ(runs[2].data_s, 20.0);
   EXPECT_EQ(read_run(folder.file("run.yaml")).before.size(), 2U);
 }

@@ -206,8 +206,8 @@ TEST(MapLogResume, appends_to_the_session_and_goes_on_counting) {
   const std::vector<exporter::RunInfo> runs = exporter::runs_in(folder.path());
   ASSERT_EQ(runs.size(), 2U);
   EXPECT_EQ(runs[0].log, "stored");
-  EXPECT_LT(runs[0].end_ns, runs[1].begin_ns);
-  EXPECT_NEAR(to_seconds(runs[1].begin_ns - runs[0].begin_ns), 4.5, 0.02);
+  EXPECT_LT(runs[0].end_ns.value(), runs[1].begin_ns.value());
+  EXPECT_NEAR(to_seconds(*runs[1].begin_ns - runs[0].begin_ns.value()), 4.5, 0.02);
   EXPECT_EQ(exporter::read_sweeps(folder.file("sweeps.csv")).size(),
             exporter::read_trajectory(folder.file("lio.tum")).size());
 }

@@ -82,6 +82,24 @@ TEST(GatePart, does_not_admit_in_a_new_odom_epoch_what_it_admitted_in_the_one_be
   EXPECT_EQ(kept_in(folder).alignment.odom_epoch, 1U);
   EXPECT_FALSE(kept_in(folder).admitted);
   EXPECT_TRUE(kept_in(folder).was_admitted);
+  EXPECT_THAT(kept_in(folder).comment, HasSubstr("one before it was"));
+}
+
+/// A power failure leaves files of no bytes.
+TEST(GatePart, begins_anew_and_says_so_where_what_it_goes_on_from_is_damaged) {
+  const ScratchFolder folder;
+  write_all(folder.file("alignment.yaml"), "");
+  write_all(folder.file("fusion_gate.counts.yaml"), "fix.judged: [\n");
+  GatePart part(folder.path(), exporter::Opening::kContinue);
+  const Events events = part.take_events();
+  ASSERT_EQ(events.size(), 2U);
+  EXPECT_THAT(events[0].text, HasSubstr("fusion_gate.counts.yaml"));
+  EXPECT_THAT(events[1].text, HasSubstr("alignment.yaml"));
+  EXPECT_TRUE(part.take_events().empty());
+  part.on_alignment(at_x(3.0), true);
+  part.close();
+  EXPECT_TRUE(kept_in(folder).admitted);
+  EXPECT_FALSE(kept_in(folder).was_admitted);
 }
 
 TEST(GatePart, writes_nothing_while_nobody_knows_an_alignment) {
@@ -93,28 +111,46 @@ TEST(GatePart, writes_nothing_while_nobody_knows_an_alignment) {
   EXPECT_FALSE(std::filesystem::exists(folder.file("alignment.yaml")));
 }
 
+void receive(LogPart& part, Nanoseconds receive_ns, auto measurement, Nanoseconds stamp_ns) {
+  measurement.stamp_ns = stamp_ns;
+  recording::LogEntry entry;
+  entry.receive_ns = receive_ns;
+  entry.measurement = measurement;
+  part.on_entry(entry);
+}
+
+/// The LiDAR's own clock is far ahead, as one on TAI is: its stamps say nothing of the arrival.
 TEST(LogPart, writes_every_sweep_down_on_the_clock_of_the_imu) {
   const ScratchFolder folder;
   LogPart part(folder.path());
-  const auto receive = [&](Nanoseconds receive_ns, auto measurement, Nanoseconds stamp_ns) {
-    measurement.stamp_ns = stamp_ns;
-    recording::LogEntry entry;
-    entry.receive_ns = receive_ns;
-    entry.measurement = measurement;
-    part.on_entry(entry);
-  };
-  receive(1000, PointCloudMessage{}, 77);  // before any IMU sample: its own stamp
-  receive(1010, ImuSample{}, 500);
-  receive(1030, PointCloudMessage{}, 90);
-  receive(1040, ImuSample{}, 540);
+  EXPECT_FALSE(part.begin_ns());
+  receive(part, 1000, PointCloudMessage{}, 37'077);  // before any IMU sample
+  EXPECT_TRUE(exporter::read_sweeps(folder.file("sweeps.csv")).empty());
+  receive(part, 1010, ImuSample{}, 500);
+  receive(part, 1030, PointCloudMessage{}, 37'090);
+  receive(part, 1040, ImuSample{}, 540);
   EXPECT_EQ(part.begin_ns(), 500);
   EXPECT_EQ(part.end_ns(), 540);
   const auto sweeps = exporter::read_sweeps(folder.file("sweeps.csv"));
   ASSERT_EQ(sweeps.size(), 2U);
-  EXPECT_EQ(sweeps[0].arrival_ns, 77);
-  EXPECT_EQ(sweeps[1].stamp_ns, 90);
+  EXPECT_EQ(sweeps[0].stamp_ns, 37'077);
+  EXPECT_EQ(sweeps[0].receive_ns, 1000);
+  EXPECT_EQ(sweeps[0].arrival_ns, 490);
+  EXPECT_EQ(sweeps[1].stamp_ns, 37'090);
   EXPECT_EQ(sweeps[1].receive_ns, 1030);
   EXPECT_EQ(sweeps[1].arrival_ns, 520);
+}
+
+/// A log whose stamps begin at zero, as simulators' do.
+TEST(LogPart, knows_an_imu_sample_at_time_zero) {
+  const ScratchFolder folder;
+  LogPart part(folder.path());
+  receive(part, 0, ImuSample{}, 0);
+  receive(part, 30, PointCloudMessage{}, 10);
+  EXPECT_EQ(part.begin_ns(), 0);
+  const auto sweeps = exporter::read_sweeps(folder.file("sweeps.csv"));
+  ASSERT_EQ(sweeps.size(), 1U);
+  EXPECT_EQ(sweeps[0].arrival_ns, 30);
 }
 
 /// Has truth beside it.
@@ -144,11 +180,41 @@ TEST(LogPart, appends_the_truth_of_a_later_day_to_that_of_the_session) {
   const ScratchFolder logs;
   write_all(logs.file("one.tum"), kHead + kDayOne);
   write_all(logs.file("two.tum"), kHead + kDayTwo);
-  LogPart(folder.path()).keep_truth(LogWithTruth(logs.file("one.tum")));
+  EXPECT_FALSE(LogPart(folder.path()).keep_truth(LogWithTruth(logs.file("one.tum"))));
   const LogPart resumed(folder.path(), exporter::Opening::kContinue);
-  resumed.keep_truth(LogWithTruth(logs.file("two.tum")));
-  resumed.keep_truth(LogWithTruth(logs.file("two.tum")));  // at the end once more
-  EXPECT_EQ(read_all(folder.file("truth.tum")), kHead + kDayOne + kDayTwo);
+  EXPECT_FALSE(resumed.keep_truth(LogWithTruth(logs.file("two.tum"))));
+  EXPECT_FALSE(resumed.keep_truth(LogWithTruth(logs.file("two.tum"))));  // at the end once more
+  const std::string whole = read_all(folder.file("truth.tum"));
+  EXPECT_TRUE(whole.starts_with(kHead + kDayOne));
+  const auto poses = exporter::read_trajectory(folder.file("truth.tum"));
+  ASSERT_EQ(poses.size(), 3U);
+  EXPECT_EQ(poses[2].stamp_ns, 86'401'500'000'000);
+  EXPECT_EQ(poses[2].pose.p.x(), 5.0);
+}
+
+TEST(LogPart, appends_only_what_is_later_of_a_truth_with_blank_lines_and_indented_comments) {
+  const ScratchFolder folder;
+  const ScratchFolder logs;
+  write_all(logs.file("one.tum"), kHead + kDayOne);
+  write_all(logs.file("two.tum"), "  \n # a comment\n" + kDayOne + kDayTwo);
+  EXPECT_FALSE(LogPart(folder.path()).keep_truth(LogWithTruth(logs.file("one.tum"))));
+  EXPECT_FALSE(LogPart(folder.path(), exporter::Opening::kContinue)
+                   .keep_truth(LogWithTruth(logs.file("two.tum"))));
+  EXPECT_EQ(exporter::read_trajectory(folder.file("truth.tum")).size(), 3U);
+}
+
+TEST(LogPart, leaves_out_a_truth_that_cannot_be_read_and_says_so) {
+  const ScratchFolder folder;
+  const ScratchFolder logs;
+  write_all(logs.file("one.tum"), kHead + kDayOne);
+  write_all(logs.file("two.tum"), kDayTwo + kDayTwo);  // one stamp twice
+  EXPECT_FALSE(LogPart(folder.path()).keep_truth(LogWithTruth(logs.file("one.tum"))));
+  const auto left_out = LogPart(folder.path(), exporter::Opening::kContinue)
+                            .keep_truth(LogWithTruth(logs.file("two.tum")));
+  ASSERT_TRUE(left_out);
+  EXPECT_EQ(left_out->severity, Severity::kWarning);
+  EXPECT_THAT(left_out->text, HasSubstr("two.tum:2"));
+  EXPECT_EQ(read_all(folder.file("truth.tum")), kHead + kDayOne);
 }
 
 TEST(LogPart, appends_no_truth_in_another_frame) {
@@ -156,9 +222,9 @@ TEST(LogPart, appends_no_truth_in_another_frame) {
   const ScratchFolder logs;
   write_all(logs.file("one.tum"), kHead + kDayOne);
   write_all(logs.file("two.tum"), "# datum 43.1 -78.0 100.0\n" + kDayTwo);
-  LogPart(folder.path()).keep_truth(LogWithTruth(logs.file("one.tum")));
-  LogPart(folder.path(), exporter::Opening::kContinue)
-      .keep_truth(LogWithTruth(logs.file("two.tum")));
+  EXPECT_FALSE(LogPart(folder.path()).keep_truth(LogWithTruth(logs.file("one.tum"))));
+  EXPECT_FALSE(LogPart(folder.path(), exporter::Opening::kContinue)
+                   .keep_truth(LogWithTruth(logs.file("two.tum"))));
   EXPECT_EQ(read_all(folder.file("truth.tum")), kHead + kDayOne);
 }
 

@@ -187,7 +187,7 @@ struct AlignmentRecord {
   Alignment alignment;
   bool admitted{false};
   std::string comment;       ///< e.g. why it is not admitted
-  bool was_admitted{false};  ///< it, or that of an odom epoch before, and is not any more
+  bool was_admitted{false};  ///< it or one before it (of another odom epoch, say), but not now
 };
 
 /// False when the covariance is the placeholder of what nobody knows (kUnknownVariance).
@@ -211,11 +211,11 @@ struct RunInfo {
   std::string mode;         ///< of the gate
   std::string gps_filter;   ///< e.g. "ekf15"
   double data_s{0.0};       ///< duration of the log
-  double wall_s{0.0};       ///< processing time
+  double wall_s{0.0};       ///< processing time; both are 0 until the run has ended
   bool interrupted{false};  ///< by the user: what was in flight then is missing
-  /// Stamps of the first and the last IMU sample of the log, as used; 0: none, or not known.
-  Nanoseconds begin_ns{0};
-  Nanoseconds end_ns{0};
+  /// Stamps of the first and the last IMU sample of the log, as used; nullopt: none, or not known.
+  std::optional<Nanoseconds> begin_ns{};
+  std::optional<Nanoseconds> end_ns{};
   /// What the session held already when it was resumed, oldest first; they have none themselves.
   std::vector<RunInfo> before{};
 };

@@ -6,6 +6,7 @@
 // valid.
 #pragma once
 
+#include "trigpoint/base/event.hpp"
 #include "trigpoint/base/messages.hpp"
 #include "trigpoint/export/session.hpp"
 #include "trigpoint/lio_mapper/keyframe_store.hpp"
@@ -15,6 +16,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace trigpoint::pipeline {
 
@@ -81,9 +83,12 @@ class MapperPart {
 /// fused.tum, gate.csv, alignment.yaml and the gate's counts.
 class GatePart {
  public:
-  /// Goes on (`Opening::kContinue`) from the alignment that the session has.
+  /// Goes on (`Opening::kContinue`) from the alignment and the counts that the session has. Files
+  /// of them that are damaged (a power failure leaves empty ones) count for nothing.
   explicit GatePart(const std::string& session,
                     exporter::Opening opening = exporter::Opening::kFresh);
+  /// Warnings about what was damaged, once.
+  Events take_events();
   void on_fused(const Odometry& odometry);
   void on_status(const FusionStatus& status);
   /// The best alignment at this moment, and whether the mapper has taken it. Without one, or with
@@ -100,6 +105,7 @@ class GatePart {
   void write_alignment(const exporter::AlignmentRecord& record);
 
   std::string session_;
+  Events events_;
   exporter::TrajectoryWriter trajectory_;
   exporter::GateLog gate_log_;
   exporter::CountsWriter counts_;
@@ -114,22 +120,25 @@ class LogPart {
  public:
   explicit LogPart(const std::string& session,
                    exporter::Opening opening = exporter::Opening::kFresh);
+  /// sweeps.csv gets the sweeps before the first IMU sample when that has come.
   void on_entry(const recording::LogEntry& entry);
   /// `log` is what the entries came from; it knows what it passed over.
   void close(const recording::LogReader& log);
   /// Copies the truth that lies beside the log, if any; for scoring only. A session that goes on
   /// keeps the truth that it has, and what is later is appended: unless the two are in `map` at
-  /// different datums, since then the new one is in another frame.
-  void keep_truth(const recording::LogReader& log) const;
+  /// different datums, since then the new one is in another frame. A truth that cannot be read is
+  /// no reason to stop: nothing of it is appended, and a warning says why.
+  [[nodiscard]] std::optional<Event> keep_truth(const recording::LogReader& log) const;
 
-  Nanoseconds first_ns() const { return first_ns_; }
+  /// From the first to the newest entry.
+  double data_s() const;
 
-  Nanoseconds last_ns() const { return last_ns_; }
+  /// Stamps of the first and the newest IMU sample, if any.
+  std::optional<Nanoseconds> begin_ns() const { return begin_ns_; }
 
-  /// Stamps of the first and the newest IMU sample; zero without one.
-  Nanoseconds begin_ns() const { return begin_ns_; }
-
-  Nanoseconds end_ns() const { return newest_imu_.stamp_ns; }
+  std::optional<Nanoseconds> end_ns() const {
+    return newest_imu_ ? std::optional(newest_imu_->stamp_ns) : std::nullopt;
+  }
 
   std::uint64_t sweeps() const { return sweeps_; }
 
@@ -141,16 +150,18 @@ class LogPart {
 
   void on_imu(Moment sample);
   void on_sweep(Moment sweep);
+  void write(Moment sweep, Moment imu);
 
   std::string session_;
   exporter::Opening opening_;
   exporter::FixLog fixes_;
   exporter::SweepLog sweep_log_;
   exporter::CountsWriter counts_;
-  Nanoseconds first_ns_{0};
-  Nanoseconds last_ns_{0};
-  Nanoseconds begin_ns_{0};
-  Moment newest_imu_;
+  std::optional<Nanoseconds> first_ns_;
+  std::optional<Nanoseconds> last_ns_;
+  std::optional<Nanoseconds> begin_ns_;
+  std::optional<Moment> newest_imu_;
+  std::vector<Moment> early_sweeps_;  ///< before the first IMU sample: when they came shows then
   std::uint64_t sweeps_{0};
   std::uint64_t imu_{0};
   std::uint64_t twists_{0};
