@@ -246,10 +246,8 @@ Resumption::Found Resumption::compose(const StartResult& start,
   found.past.drift_covariance = checkpoint_.drift_covariance;
   found.past.map = std::move(map);
   char fit[120];
-  std::snprintf(fit,
-                sizeof fit,
-                "; %.0f %% of what stands out lies on the map",
-                100.0 * registration.share);
+  std::snprintf(
+      fit, sizeof fit, "; %.0f %% of what stands out lies on the map", 100.0 * registration.share);
   found.text = offset_text(registration.centre, registration.T_odom_base) + fit;
   return found;
 }
