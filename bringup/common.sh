@@ -69,3 +69,9 @@ how_often_failed() {
   lines=$(($(wc -l <"$1") - 1))
   [ $lines -eq 1 ] && echo "a process failed once" || echo "processes failed $lines times"
 }
+
+# has_failed_by_itself SESSION: for the player every SIGTERM is the user's, that of a script too which ends
+# what is left after a failure. The report takes what is missing after the user's for no loss.
+has_failed_by_itself() {
+  [ ! -f "$1/run.yaml" ] || sed -i '/^interrupted:/d' "$1/run.yaml"
+}

@@ -115,6 +115,36 @@ TEST_F(HostRestart, of_one_process_is_counted_in_words) {
   EXPECT_THAT(result.output, HasSubstr("bringup/host: a process failed once; see " + part_));
 }
 
+/// The report takes what is missing at the end of a run that the user stopped for no loss.
+TEST_F(HostRestart, that_is_given_up_is_not_taken_for_the_user_s_stop_of_the_player) {
+  const std::vector<std::string> arguments{"mapper,filter,gate", "--play", "short"};
+  const std::string program = "trigpoint_fusion_gate";
+  const auto plays = [&] {
+    const std::string scans = read_file(part_ + "/scans.csv");
+    return std::count(scans.begin(), scans.end(), '\n') > 10;
+  };
+  const auto run_yaml = [&] { return read_file(part_ + "/run.yaml"); };
+  {
+    const auto running = host(arguments);
+    ASSERT_TRUE(comes_true(plays)) << running->output_so_far();
+    const auto given_up = [&] {
+      if (const int number = pid_of(program); number > 0) {
+        kill(number, SIGKILL);
+      }
+      return running->output_so_far().find("giving up") != std::string::npos;
+    };
+    ASSERT_TRUE(comes_true(given_up)) << running->output_so_far();
+    EXPECT_EQ(running->wait(kForever).exit_code, 1);
+    EXPECT_THAT(run_yaml(), AllOf(HasSubstr("log: "), Not(HasSubstr("interrupted"))));
+  }
+  std::filesystem::remove_all(part_);
+  const auto running = host(arguments);
+  ASSERT_TRUE(comes_true(plays)) << running->output_so_far();
+  running->signal(SIGTERM);
+  EXPECT_EQ(running->wait(kForever).exit_code, 0);
+  EXPECT_THAT(run_yaml(), HasSubstr("interrupted: true"));
+}
+
 TEST_F(HostRestart, does_not_try_again_what_cannot_be) {
   write_file(folder_.path("c.yaml"), "fusion_gate: {no_such_key: 1}\n");
   const auto refused = host({"base", "--config", folder_.path("c.yaml")})->wait(kForever);

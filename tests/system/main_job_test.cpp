@@ -19,6 +19,7 @@ namespace trigpoint {
 namespace {
 
 using namespace std::chrono_literals;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using tests::Command;
@@ -187,7 +188,7 @@ TEST(MainJobStopped, by_the_user_keeps_what_was_done_and_says_so) {
   EXPECT_EQ(result.exit_code, 130) << result.output;
   EXPECT_THAT(result.output, HasSubstr("interrupted"));
   EXPECT_TRUE(fs::exists(session + "/map.pcd")) << result.output;
-  EXPECT_TRUE(fs::exists(session + "/report.md"));
+  EXPECT_THAT(tests::read_file(session + "/report.md"), HasSubstr("interrupted by the user"));
 }
 
 TEST(MainJobStopped, before_anything_was_driven_leaves_nothing_in_the_way_of_the_next_run) {
@@ -230,6 +231,11 @@ TEST(MainJobStopped, by_a_process_that_cannot_be_kept_running_names_it_and_keeps
   EXPECT_THAT(result.output, HasSubstr("for the 6th time in quick succession; giving up"));
   EXPECT_THAT(result.output, HasSubstr("trigpoint_lio_mapper ended"));
   EXPECT_TRUE(fs::exists(session + "/map.pcd")) << result.output;
+  EXPECT_FALSE(exporter::read_run(session + "/run.yaml").interrupted) << "the player was ended too";
+  EXPECT_THAT(tests::read_file(session + "/report.md"),
+              AllOf(HasSubstr("Failed"),
+                    HasSubstr("sweeps were never answered by the mapper"),
+                    Not(HasSubstr("by the user"))));
 }
 
 TEST(MainJobStopped, by_its_own_death_leaves_no_process_behind_and_the_domain_free) {
