@@ -120,6 +120,7 @@ void clone_scripts(const TemporaryFolder& folder) {
   for (const char* name : {"run", "host", "common.sh"}) {
     fs::copy_file(script(name), folder.path("bringup") + "/" + name);
   }
+  fs::create_directory_symlink(script("profiles"), folder.path("bringup/profiles"));
   fs::create_directories(folder.path("config"));
   fs::create_directory_symlink(std::string(TRIGPOINT_SOURCE_DIR) + "/config/scenarios",
                                folder.path("config/scenarios"));
@@ -137,6 +138,8 @@ TEST(Bringup, run_and_host_find_what_they_can_before_they_build) {
       {{"run", "short", "--rate", "abc"}, "--rate must be 'max' or a number above 0"},
       {{"run", "short", "--rate", "0.0"}, "--rate must be 'max' or a number above 0"},
       {{"run", "short", "--seed", "1.5"}, "--seed must be a whole number"},
+      {{"run", "short", "--beams", "17"}, "--beams must be 16, 32 or 64; is '17'"},
+      {{"run", "short", "--beams", "0x10"}, "--beams must be 16, 32 or 64"},
       {{"run", "short", "--duration", "-1"}, "--duration must be a number above 0"},
       {{"run", "short", "--start", "x"}, "--start must be a number of 0 or more"},
       {{"run", "short", "--nonsense"}, "unknown argument '--nonsense'"},
@@ -163,6 +166,48 @@ TEST(Bringup, run_and_host_find_what_they_can_before_they_build) {
         run_command({folder.path("bringup/run"), log, "--rate", "1.5e0", "--start", "2.5"});
     EXPECT_THAT(good.output, HasSubstr("built: trigpoint_job\n")) << log;
   }
+}
+
+CommandResult run_after_build(const TemporaryFolder& folder,
+                              const std::string& build,
+                              std::vector<std::string> arguments) {
+  tests::write_file(folder.path("bringup/build"), "#!/bin/sh\n" + build + "\n");
+  arguments.front() = folder.path("bringup") + "/" + arguments.front();
+  return run_command(
+      arguments,
+      60s,
+      {{"ROS_DOMAIN_ID", tests::own_domain(53)}, {"TRIGPOINT_BIN", TRIGPOINT_BIN_DIR}});
+}
+
+/// A build takes minutes, in which another one may begin.
+TEST(Bringup, run_and_host_refuse_a_folder_that_another_one_took_while_they_built) {
+  const TemporaryFolder folder;
+  clone_scripts(folder);
+  const std::string session = folder.path("s");
+  for (const auto& [name, argument] : {std::pair{"run", "short"}, std::pair{"host", "base"}}) {
+    const CommandResult result = run_after_build(
+        folder, "mkdir -p " + session + "/logs", {name, argument, "--out", session});
+    EXPECT_EQ(result.exit_code, 2) << result.output;
+    EXPECT_THAT(result.output, HasSubstr("has taken '" + session + "'"));
+    EXPECT_FALSE(fs::exists(session + "/config.yaml")) << name;
+    fs::remove_all(session);
+  }
+}
+
+TEST(Bringup, host_names_its_part_after_the_time_at_which_it_begins) {
+  const TemporaryFolder folder;
+  clone_scripts(folder);
+  tests::write_file(folder.path("sessions"), "no folder: the name is told, and nothing begins\n");
+  const CommandResult result = run_after_build(
+      folder, "sleep 1.1; echo built at $(date +%Y%m%d-%H%M%S); sleep 1.1", {"host", "base"});
+  EXPECT_EQ(result.exit_code, 1) << result.output;
+  const auto stamp_after = [&](const std::string& words) {
+    const auto at = result.output.rfind(words);
+    return at == std::string::npos ? "" : result.output.substr(at + words.size(), 15);
+  };
+  EXPECT_GT(stamp_after("cannot make the session folder '" + folder.path("sessions") + "/"),
+            stamp_after("built at "))
+      << result.output;
 }
 
 /// So that who has built for one can run the other with --no-build.
