@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <utility>
 
 namespace trigpoint::lio_mapper {
 
@@ -59,6 +60,28 @@ Database opened(const std::string& file) {
   return {file, SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, uri_of_unchanging(file)};
 }
 
+/// Who reads changes nothing, a store that it refuses neither. To be gone before the database is.
+class UntouchedLog {
+ public:
+  UntouchedLog(std::string file, Database& database) : file_(std::move(file)), database_(database) {
+    database_.leave_log();
+  }
+
+  /// Asked at the end: a writer may have come and been killed in between.
+  ~UntouchedLog() {
+    if (!has_log(file_)) {
+      database_.remove_log();
+    }
+  }
+
+  UntouchedLog(const UntouchedLog&) = delete;
+  UntouchedLog& operator=(const UntouchedLog&) = delete;
+
+ private:
+  std::string file_;
+  Database& database_;
+};
+
 PointCloud raw_points(const Statement& row, int column) {
   PointCloud points(row.size(column) / sizeof(PointXyzi));
   row.copy(column, points.data(), points.size() * sizeof(PointXyzi));
@@ -68,8 +91,7 @@ PointCloud raw_points(const Statement& row, int column) {
 }  // namespace
 
 struct KeyframeReader::Impl {
-  explicit Impl(const std::string& path) : file(path), database(opened(path)) {
-    database.leave_log();  // who reads changes nothing
+  explicit Impl(const std::string& path) : database(opened(path)), log(path, database) {
     version = store::version_of(database);
     if (version < store::kRawPointsVersion || version > store::kFormatVersion) {
       database.fail("has format version " + std::to_string(version) + ", this program reads " +
@@ -77,16 +99,6 @@ struct KeyframeReader::Impl {
                     std::to_string(store::kFormatVersion));
     }
   }
-
-  /// Asked at the end: a writer may have come and been killed in between.
-  ~Impl() {
-    if (!has_log(file)) {
-      database.remove_log();
-    }
-  }
-
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
 
   bool has_all() const { return version > store::kRawPointsVersion; }
 
@@ -216,8 +228,8 @@ struct KeyframeReader::Impl {
     }
   }
 
-  std::string file;
   Database database;
+  UntouchedLog log;
   std::int64_t version{0};
   std::optional<std::vector<std::int64_t>> order;  ///< row numbers by time
 };

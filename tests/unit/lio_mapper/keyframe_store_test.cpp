@@ -339,6 +339,8 @@ TEST_F(KeyframeStore, refuses_another_format_version) {
   write(file(), 1);
   run_sql(file(), "PRAGMA user_version=77");
   EXPECT_THAT(error_of_reading(file()), HasSubstr("format version 77, this program reads 3 to 5"));
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_), {}), 1)
+      << "nothing is left";
   EXPECT_THAT(error_of_writing(file()), HasSubstr("format version 77"));
 }
 
