@@ -117,11 +117,19 @@ std::optional<int> domain_in_environment(const LocalProcess& process) {
   return error == std::errc{} && read_to == end ? std::optional(domain) : std::nullopt;
 }
 
+/// A debugger's hold is another state (t) since Linux 2.6.33.
+bool is_stopped(std::optional<char> state) {
+  return state == 'T' || state == 't';
+}
+
 /// A clause: what a silent process of this kind does, and what to do about it.
 std::string remedy(const std::string& main_topic, std::optional<char> state, unsigned process) {
   if (state == 'T') {
-    return "it is stopped by a signal (SIGSTOP, Ctrl-Z, a debugger): kill -CONT " +
-           std::to_string(process) + " lets it go on";
+    return "it is stopped by a signal (SIGSTOP, Ctrl-Z): kill -CONT " + std::to_string(process) +
+           " lets it go on";
+  }
+  if (state == 't') {
+    return "a debugger holds it, and alone can let it go on";
   }
   if (state == 'D') {
     return "it waits for its disk";
@@ -274,18 +282,19 @@ std::vector<Finding> not_on_the_bus(const std::vector<TopicSurvey>& surveys,
         on_the_bus.contains(process.number)) {
       continue;
     }
-    const bool is_stopped = process.state == 'T';
+    const bool its_state_tells = is_stopped(process.state) || process.state == 'D';
     found.push_back(
         {process.program,
          "process " + std::to_string(process.number) + " runs here " +
              (process.domain->empty() ? std::string("without ROS_DOMAIN_ID")
                                       : "with ROS_DOMAIN_ID " + *process.domain) +
              " and was not found on the bus in " + seconds_text(listened_s) + ": " +
-             (is_stopped ? remedy("", process.state, process.number)
-                         : "it is for another bus (a container's, or its configuration has another "
-                           "bus.domain_id, network_interface or security_folder than this "
-                           "command's), or it still starts, or hangs"),
-         is_stopped});
+             (its_state_tells
+                  ? remedy("", process.state, process.number)
+                  : "it is for another bus (a container's, or its configuration has another "
+                    "bus.domain_id, network_interface or security_folder than this "
+                    "command's), or it still starts, or hangs"),
+         is_stopped(process.state)});
   }
   return found;
 }

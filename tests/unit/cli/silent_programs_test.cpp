@@ -155,8 +155,23 @@ TEST(SilentPrograms, that_were_not_found_are_wrong_only_where_they_are_stopped) 
   const LocalProcess runs{123, "trigpoint_lio_mapper", 'S', 60.0, ""};
   EXPECT_THAT(not_on_the_bus({}, {runs}, 0, 5.0), ElementsAre(Field(&Finding::is_wrong, false)));
   LocalProcess stopped = runs;
-  stopped.state = 'T';
-  EXPECT_THAT(not_on_the_bus({}, {stopped}, 0, 5.0), ElementsAre(Field(&Finding::is_wrong, true)));
+  for (const char state : {'T', 't'}) {
+    stopped.state = state;
+    EXPECT_THAT(not_on_the_bus({}, {stopped}, 0, 5.0),
+                ElementsAre(Field(&Finding::is_wrong, true)));
+  }
+}
+
+TEST(SilentPrograms, that_were_not_found_are_told_what_their_process_waits_for) {
+  LocalProcess process{123, "trigpoint_lio_mapper", 't', 60.0, ""};
+  EXPECT_THAT(not_on_the_bus({}, {process}, 0, 5.0),
+              one("trigpoint_lio_mapper",
+                  AllOf(HasSubstr("a debugger holds it"), Not(HasSubstr("kill -CONT")))));
+  process.state = 'D';
+  EXPECT_THAT(not_on_the_bus({}, {process}, 0, 5.0),
+              one("trigpoint_lio_mapper",
+                  AllOf(HasSubstr("it waits for its disk"), Not(HasSubstr("another bus")))));
+  EXPECT_THAT(not_on_the_bus({}, {process}, 0, 5.0), ElementsAre(Field(&Finding::is_wrong, false)));
 }
 
 TEST(MapperWithoutTrack, is_told_with_what_it_does) {
