@@ -20,7 +20,8 @@ constexpr double kSigmas = 3.0;
 /// Added to what the covariance says.
 constexpr double kMargin_m = 1.0;
 constexpr double kMargin_rad = 0.05;
-constexpr double kNoRival_m = 2.0;
+/// In so small an area the robot is where the prediction is, if nothing speaks for another place.
+constexpr double kSmall_m = 2.0;
 /// Grows with the uncertainty up to this many times what a restart searches.
 constexpr double kMostRadii = 2.0;
 
@@ -72,8 +73,8 @@ Sighting LostTrack::search(ScanFilter& filter,
   SearchArea area{{T},
                   std::min(kMargin_m + reach_m(covariance), kMostRadii * config_.radius_m),
                   std::min(kMargin_rad + reach_rad(covariance), config_.yaw_rad)};
-  // So small an area has no other place in it that could be the better one.
-  area.holds_robot = area.radius_m < kNoRival_m;
+  area.holds_robot =
+      area.radius_m < kSmall_m && kMargin_rad + reach_rad(covariance) <= config_.yaw_rad;
   const RegistrationResult result =
       register_scan(scan, filter.map(), area, matching_, config_, filter.workers());
   obstacle_ = result.obstacle;

@@ -31,8 +31,8 @@ struct SearchArea {
   std::vector<Pose> centres_odom;  ///< roll and pitch do not count
   double radius_m{0.0};            ///< about each of them
   double yaw_rad{0.0};             ///< to either side of its heading
-  /// The robot is known to be in the area: no rival counts, and of places that are as good the
-  /// nearest to its centre. Heights are the centres' own, not the ground's.
+  /// The robot is known to be in the area: places as good in one piece are no rivals, the nearest
+  /// to the centre is taken. Heights are the centres' own, not the ground's.
   bool holds_robot{false};
 };
 
@@ -52,11 +52,11 @@ struct RegistrationResult {
 };
 
 /// Correlative search (Olson, Real-time correlative scan matching, ICRA 2009): a grid of places and
-/// headings, each put on the ground, is scored by where the points that stand out of it come to lie
-/// in the map's likelihood field; the best few climb within their cell of the grid, and the first
-/// is refined with the iterated matcher. Accepted where enough of what stands out lies on the map
-/// and clearly more than at any other place. Deterministic for any number of workers.
-/// Throws std::invalid_argument when the area has no centre.
+/// headings, at the expected height and on the ground, is scored by where the points that stand out
+/// of it come to lie in the map's likelihood field; the best few climb within their cell of the
+/// grid, and the first is refined with the iterated matcher. Accepted where enough of what stands
+/// out lies on the map and clearly more than at any other place. Deterministic for any number of
+/// workers. Throws std::invalid_argument when the area has no centre.
 RegistrationResult register_scan(const LevelScan& scan,
                                  const LocalMap& map,
                                  const SearchArea& area,

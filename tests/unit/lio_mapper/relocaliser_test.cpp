@@ -206,6 +206,57 @@ TEST(Relocaliser, finds_its_place_on_a_slope) {
   expect_found_at(result, truth);
 }
 
+/// Plain walls, 8 m high, on a hill of 15 %: at any height they look the same.
+PointCloud courtyards(unsigned points_seed) {
+  Draw draw(points_seed);
+  PointCloud cloud;
+  add_ground(cloud, draw);
+  for (int i = 0; i < 8000; ++i) {
+    const double along_m = draw.between(-15.0, 25.0);
+    const double z_m = draw.between(0.0, 8.0);
+    add(cloud, {along_m, 8.0 + draw.normal(0.02), z_m});
+    add(cloud, {25.0 + draw.normal(0.02), draw.between(-20.0, 8.0), z_m});
+    add(cloud, {-12.0 + draw.normal(0.02), draw.between(-20.0, -4.0), z_m});
+  }
+  return lifted(cloud, [](double x_m) { return 0.15 * x_m; });
+}
+
+TEST(Relocaliser, does_not_float_between_walls_on_a_slope) {
+  for (const double beside_m : {-9.0, -5.0, 5.0, 9.0}) {
+    Pose truth = standing_at(6.0, -3.0, 0.0);
+    truth.p.z() += 0.15 * truth.p.x();
+    Pose expected = standing_at(truth.p.x() + beside_m, -2.0, 0.1);
+    expected.p.z() += 0.15 * expected.p.x();
+    const RegistrationResult result =
+        look(courtyards(1), seen_from(courtyards(2), truth), {{expected}, 10.0, 0.5236});
+    expect_found_at(result, truth);
+    EXPECT_NEAR(result.best->T_odom_base.p.z(), truth.p.z(), 0.05);
+  }
+}
+
+TEST(Relocaliser, takes_neither_of_two_places_in_a_small_area_that_holds_the_robot) {
+  // Rows of thick trees, 3 m apart both ways.
+  const auto orchard = [](unsigned points_seed) {
+    Draw draw(points_seed);
+    PointCloud cloud;
+    add_ground(cloud, draw);
+    for (int x = -12; x <= 12; ++x) {
+      for (int y = -12; y <= 12; ++y) {
+        for (int i = 0; i < 40; ++i) {
+          add(cloud, draw.blob({3.0 * x, 3.0 * y, 2.0}, 0.3));
+        }
+      }
+    }
+    return cloud;
+  };
+  SearchArea area{{standing_at(0.0, 0.0, 0.0)}, 1.9, 0.2};
+  area.holds_robot = true;
+  const RegistrationResult result =
+      look(orchard(1), seen_from(orchard(2), standing_at(1.5, 0.2, 0.0)), area);
+  EXPECT_FALSE(result.accepted);
+  EXPECT_GT(result.best->runner_up_share, 0.3);
+}
+
 TEST(Relocaliser, finds_its_place_above_another_floor) {
   Draw draw(6);
   PointCloud map = forest(11);
@@ -288,6 +339,15 @@ TEST(Relocaliser, stays_near_the_middle_along_a_corridor_where_the_area_holds_th
   // And says so.
   EXPECT_GT(std::sqrt(result.best->spread_m2(0, 0)), 0.5);
   EXPECT_LT(std::sqrt(result.best->spread_m2(1, 1)), 0.2);
+}
+
+TEST(Relocaliser, says_that_a_wide_area_along_a_corridor_is_as_uncertain_as_wide) {
+  SearchArea area{{standing_at(1.8, 0.0, 0.0)}, 5.0, 0.2};
+  area.holds_robot = true;
+  const RegistrationResult result =
+      look(corridor(1), seen_from(corridor(2), standing_at(2.0, 0.5, 0.1)), area);
+  ASSERT_TRUE(result.accepted) << result.obstacle;
+  EXPECT_GT(std::sqrt(result.best->spread_m2(0, 0)), 0.3 * area.radius_m);
 }
 
 TEST(Relocaliser, does_not_depend_on_the_number_of_threads) {
