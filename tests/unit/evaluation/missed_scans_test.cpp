@@ -151,6 +151,67 @@ TEST(UnansweredSweeps, are_not_those_that_came_in_a_burst) {
   EXPECT_EQ(missed[0].scans, 7U);
 }
 
+/// Seconds from sweep k to the next one; also of the LiDAR's own stamps when there are none.
+using Interval = std::function<double(int)>;
+
+/// Every one answered, 3 ms after its last point.
+Drive rhythm(int count, const Interval& interval_s, const Interval& by_stamps_s = {}) {
+  Drive made;
+  Nanoseconds end_ns = kStart_ns;
+  Nanoseconds stamp_ns = kStart_ns - kInterval_ns;
+  for (int k = 0; k < count; ++k) {
+    made.sweeps.push_back({stamp_ns, end_ns + 3'000'000, end_ns + 3'000'000});
+    auto& scan = made.scans.emplace_back();
+    scan.status.stamp_ns = end_ns;
+    scan.status.scans_received = scan.status.scans_used = made.scans.size();
+    end_ns += from_seconds(interval_s(k));
+    stamp_ns += from_seconds((by_stamps_s ? by_stamps_s : interval_s)(k));
+  }
+  return made;
+}
+
+/// Whether in two drives, in one, by loss, or from sweep to sweep.
+TEST(UnansweredSweeps, are_none_where_the_interval_is_not_always_the_same) {
+  const double day_s = 86'400.0;
+  const auto rate_of_day = [&](int k) { return k == 2999 ? day_s : k < 3000 ? 0.05 : 0.1; };
+  const Drive days = rhythm(7000, rate_of_day);
+  EXPECT_THAT(missed_in(days), IsEmpty());
+  const Breaks second_day{days.sweeps[3000].arrival_ns - kInterval_ns};
+  EXPECT_THAT(find_unanswered_sweeps({days.sweeps, days.scans, 0, second_day}), IsEmpty());
+  const Interval no_clock = [](int) { return 0.0; };
+  EXPECT_THAT(missed_in(rhythm(7000, rate_of_day, no_clock)), IsEmpty());
+  EXPECT_THAT(missed_in(rhythm(5000, [](int k) { return k < 3000 ? 0.1 : 0.05; })), IsEmpty());
+  EXPECT_THAT(missed_in(rhythm(5000, [](int k) { return k < 2000 ? 0.05 : 0.1; })), IsEmpty());
+  EXPECT_THAT(missed_in(rhythm(3000, [](int k) { return k * 55 % 100 < 55 ? 0.2 : 0.1; })),
+              IsEmpty());
+  const auto nine = [](int k) { return k % 9 == 8 ? 0.084 : 0.102; };
+  EXPECT_THAT(missed_in(rhythm(6000, nine)), IsEmpty());
+  EXPECT_THAT(missed_in(rhythm(
+                  6000, [](int) { return 0.1; }, nine)),
+              IsEmpty());
+}
+
+TEST(UnansweredSweeps, are_none_where_the_clock_of_the_lidar_is_set) {
+  const auto even = [](int) { return 0.1; };
+  for (const double step_s : {-3600.0, -0.35, 0.35, 2.0, 3600.0}) {
+    EXPECT_THAT(missed_in(rhythm(2000, even, [&](int k) { return k == 999 ? 0.1 + step_s : 0.1; })),
+                IsEmpty())
+        << step_s;
+  }
+}
+
+TEST(UnansweredSweeps, are_found_beside_a_burst_at_another_rate) {
+  Drive made = rhythm(7000, [](int k) { return k < 4000 ? 0.1 : 0.05; });
+  for (std::size_t k = 6000; k < 6030; ++k) {
+    made.sweeps[k].arrival_ns = made.sweeps[6030].arrival_ns;
+  }
+  EXPECT_THAT(missed_in(made), IsEmpty());
+  made.scans.erase(made.scans.begin() + 6010, made.scans.begin() + 6017);
+  const auto missed = missed_in(made);
+  ASSERT_EQ(missed.size(), 1U);
+  EXPECT_EQ(missed[0].scans, 7U);
+}
+
 /// A scan with too few matches is refused and has a row: it explains no other one.
 TEST(UnansweredSweeps, are_not_explained_by_a_refused_scan_that_has_a_row) {
   Drive made = drive(100, [](int k) { return k < 40 || k >= 47; });
