@@ -338,10 +338,45 @@ bool refused_after_newest_scan(const SessionData& data) {
   return *refused > less(newest.scans_received, newest.scans_used);
 }
 
-bool was_mapper_restarted(const SessionData& data) {
-  return std::any_of(data.restarts.begin(), data.restarts.end(), [](const Restart& restart) {
-    return restart.restarted && restart.program.find("lio_mapper") != std::string::npos;
+bool is_of_mapper(const Restart& restart) {
+  return restart.restarted && restart.program.find("lio_mapper") != std::string::npos;
+}
+
+/// Restarts are told by the computer's clock, which is that of the estimates when a robot drives,
+/// and another one when a log is played: so only those within the silence at the end are known.
+Nanoseconds newest_begin_ns(const SessionData& data, const MissedScans& end) {
+  Nanoseconds begin_ns = end.after_ns.value_or(*end.first_ns);
+  for (const Restart& restart : data.restarts) {
+    const Nanoseconds restart_ns = restart.unix_s * kNanosecondsPerSecond;
+    if (is_of_mapper(restart) && restart_ns <= *end.newest_ns) {
+      begin_ns = std::max(begin_ns, restart_ns);
+    }
+  }
+  return begin_ns;
+}
+
+/// Since the newest scan, or since the mapper was started again after it, most sweeps were refused:
+/// then a mapper did come back, and refusals of its predecessor may be what is missing.
+bool came_back_to_refuse(const SessionData& data, const MissedScans& end) {
+  if (!std::any_of(data.restarts.begin(), data.restarts.end(), is_of_mapper)) {
+    return false;
+  }
+  const Nanoseconds begin_ns = newest_begin_ns(data, end);
+  const auto sweeps = std::count_if(data.sweeps.begin(), data.sweeps.end(), [&](const auto& sweep) {
+    return sweep.arrival_ns > begin_ns;
   });
+  return 2 * end.refused >= static_cast<std::uint64_t>(sweeps);
+}
+
+/// Not empty when there are sweeps.
+std::span<const exporter::LoggedSweep> sweeps_of_last_drive(const SessionData& data) {
+  const Breaks begins = data.run_begins();
+  std::size_t first = data.sweeps.size();
+  while (first > 0 && (first == data.sweeps.size() || begins.empty() ||
+                       data.sweeps[first - 1].arrival_ns >= begins.back())) {
+    --first;
+  }
+  return std::span(data.sweeps).subspan(first);
 }
 
 /// The longest ones, in order of time.
@@ -430,19 +465,15 @@ std::string lost_end(const SessionData& data, const std::vector<MissedScans>& mi
     return "";
   }
   const bool was_there = refused_after_newest_scan(data);
-  if (was_there && was_mapper_restarted(data)) {
+  const MissedScans& end = missed.back();
+  if (was_there && came_back_to_refuse(data, end)) {
     return "";
   }
-  const MissedScans& end = missed.back();
+  const auto last_drive = sweeps_of_last_drive(data);
   const double missing_s =
-      static_cast<double>(end.scans) * to_seconds(usual_interval_ns(data.sweeps));
-  const Breaks begins = data.run_begins();
-  const auto of_last_drive =
-      std::count_if(data.sweeps.begin(), data.sweeps.end(), [&](const auto& sweep) {
-        return begins.empty() || sweep.arrival_ns >= begins.back();
-      });
-  const double share_of_drive = static_cast<double>(end.scans) /
-                                static_cast<double>(std::max<std::ptrdiff_t>(1, of_last_drive));
+      static_cast<double>(end.scans) * to_seconds(usual_interval_ns(last_drive));
+  const double share_of_drive =
+      static_cast<double>(end.scans) / static_cast<double>(last_drive.size());
   const bool considerable =
       missing_s > kRestart_s || (missing_s > kOnItsWay_s && share_of_drive >= kConsiderableShare);
   if (!considerable) {
@@ -454,7 +485,7 @@ std::string lost_end(const SessionData& data, const std::vector<MissedScans>& mi
   const std::string why = was_there
                               ? "it was there to the end, and did not receive them or was behind"
                               : "it did not come back before the end, or was that far behind";
-  return std::to_string(end.scans) + " of " + std::to_string(of_last_drive) +
+  return std::to_string(end.scans) + " of " + std::to_string(last_drive.size()) +
          " sweeps were never answered by the mapper, " +
          (end.after_ns ? when + why : std::string("from the first to the last")) +
          ". What was driven then is not in the map.";
