@@ -5,8 +5,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 namespace trigpoint {
 namespace {
@@ -70,6 +72,29 @@ TEST(Map, of_a_scenario_is_refused_where_wheels_are_named) {
   EXPECT_EQ(result.exit_code, 2) << result.output;
   EXPECT_THAT(result.output, HasSubstr("robot.twist_topic"));
   EXPECT_FALSE(fs::exists(folder.path("s")));
+}
+
+/// A power failure leaves files of no bytes; who does not start for them never starts again.
+TEST(GpsFilter, starts_and_warns_in_a_session_whose_datum_and_counts_are_damaged) {
+  for (const std::string program : {"trigpoint_gps_eskf18", "trigpoint_fusion_gate"}) {
+    const TemporaryFolder folder;
+    tests::write_file(folder.path("datum.yaml"), "");
+    tests::write_file(folder.path("gps_odometry.counts.yaml"), "fix.received: [\n");
+    tests::Command running(
+        {std::string(TRIGPOINT_BIN_DIR) + "/" + program, "--session", folder.path()},
+        {{"ROS_DOMAIN_ID", tests::own_domain()}});
+    const auto is_ready = [&] {
+      return running.output_so_far().find("ready") != std::string::npos;
+    };
+    for (int i = 0; i < 300 && running.running() && !is_ready(); ++i) {
+      std::this_thread::sleep_for(100ms);
+    }
+    EXPECT_TRUE(is_ready()) << running.output_so_far();
+    running.signal(SIGTERM);
+    const CommandResult result = running.wait(30s);
+    EXPECT_EQ(result.exit_code, 0) << result.output;
+    EXPECT_THAT(result.output, HasSubstr("datum.yaml"));
+  }
 }
 
 }  // namespace

@@ -53,8 +53,12 @@ pipeline::UseOfStored use_of(const MapOptions& options) {
                                      : pipeline::UseOfStored::kNothing;
 }
 
+const std::string& stored_session(const MapOptions& options) {
+  return options.resume.empty() ? options.localize : options.resume;
+}
+
 std::optional<pipeline::StoredSession> stored_of(const MapOptions& options) {
-  const std::string& session = options.resume.empty() ? options.localize : options.resume;
+  const std::string& session = stored_session(options);
   return session.empty() ? std::nullopt : std::optional(pipeline::open_stored_session(session));
 }
 
@@ -174,7 +178,8 @@ MapOutcome map(MapOptions& options) {
   std::optional<pipeline::StoredSession> stored = stored_of(options);
   Input input = open_input(options.input);
   if (stored) {
-    keep_datum(stored->datum, input.config.cores.gps_odometry);
+    keep_datum(pipeline::read_stored_datum(stored_session(options)),
+               input.config.cores.gps_odometry);
     refuse_older_log(options, *stored, input.reader->summary());
   }
   if (!options.resume.empty()) {

@@ -40,8 +40,7 @@ struct PlayVerbOptions {
 /// The player's part of the session; nothing without a folder.
 class SessionPart {
  public:
-  SessionPart(const std::string& folder, const shell::EventLog& log)
-      : folder_(folder), log_(log), disk_(log) {
+  SessionPart(const std::string& folder, const shell::EventLog& log) : folder_(folder), disk_(log) {
     if (!folder.empty()) {
       exporter::create_session_folder(folder);
       part_.emplace(folder);
@@ -59,7 +58,7 @@ class SessionPart {
     if (part_) {
       disk_.keep([&] {
         write_run(reader, config, 0.0, false);
-        keep_truth(reader);
+        part_->keep_truth(reader);
       });
     }
   }
@@ -72,7 +71,7 @@ class SessionPart {
       disk_.keep([&] {
         part_->close(reader);
         write_run(reader, config, wall_s, stopped);
-        keep_truth(reader);
+        part_->keep_truth(reader);
       });
     }
   }
@@ -80,12 +79,6 @@ class SessionPart {
   bool failed() const { return disk_.failed(); }
 
  private:
-  void keep_truth(const recording::LogReader& reader) const {
-    if (const auto left_out = part_->keep_truth(reader)) {
-      log_(*left_out);
-    }
-  }
-
   void write_run(const recording::LogReader& reader,
                  const SystemConfig& config,
                  double wall_s,
@@ -103,7 +96,6 @@ class SessionPart {
   }
 
   std::string folder_;
-  shell::EventLog log_;
   shell::DiskGuard disk_;
   std::optional<pipeline::LogPart> part_;
 };

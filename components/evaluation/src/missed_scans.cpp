@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <span>
 
 namespace trigpoint::evaluation {
 
@@ -19,8 +20,10 @@ namespace file = exporter::session_file;
 constexpr double kGapIntervals = 1.5;
 /// A sweep may seem to arrive this much before its last point: the IMU's newest sample is older.
 constexpr double kEarlyIntervals = 0.25;
-/// Sweeps do not follow each other by less than this of the usual interval; they only come so.
-constexpr double kLeastIntervals = 0.99;
+/// Of the LiDAR's own time between two sweeps: two clocks do not differ by more.
+constexpr double kLeastShare = 0.99;
+/// From the first to the last arrival of sweeps that waited for each other.
+constexpr double kLongestBurst_s = 10.0;
 /// Sweeps this near to one that two scans fall on may be what one of them belongs to: arrivals
 /// jitter.
 constexpr std::ptrdiff_t kJitterSweeps = 2;
@@ -41,25 +44,52 @@ Value median_of(std::vector<Value> values) {
   return *middle;
 }
 
-/// By the LiDAR's own clock where it goes forward: arrivals may come in bursts.
-Nanoseconds usual_interval_ns(const std::vector<exporter::LoggedSweep>& sweeps) {
-  std::vector<Nanoseconds> intervals;
+/// By the LiDAR's own clock, since arrivals may come in bursts; by those where it does not go on.
+Nanoseconds usual_interval_ns(std::span<const exporter::LoggedSweep> sweeps) {
+  std::vector<Nanoseconds> by_stamps;
+  std::vector<Nanoseconds> by_arrivals;
   for (std::size_t i = 1; i < sweeps.size(); ++i) {
-    intervals.push_back(sweeps[i].stamp_ns - sweeps[i - 1].stamp_ns);
+    by_stamps.push_back(sweeps[i].stamp_ns - sweeps[i - 1].stamp_ns);
+    by_arrivals.push_back(sweeps[i].arrival_ns - sweeps[i - 1].arrival_ns);
   }
-  return std::max<Nanoseconds>(0, median_of(intervals));
+  const Nanoseconds stamps_ns = median_of(by_stamps);
+  return stamps_ns > 0 ? stamps_ns : std::max<Nanoseconds>(0, median_of(by_arrivals));
 }
 
-/// When the sweeps would have arrived if none had waited for another: each at the latest an
-/// interval before its successor.
-std::vector<Nanoseconds> due_of(const std::vector<exporter::LoggedSweep>& sweeps) {
-  const auto least_ns =
-      static_cast<Nanoseconds>(kLeastIntervals * static_cast<double>(usual_interval_ns(sweeps)));
-  std::vector<Nanoseconds> due_ns(sweeps.size());
-  for (std::size_t i = sweeps.size(); i-- > 0;) {
-    due_ns[i] = sweeps[i].arrival_ns;
-    if (i + 1 < sweeps.size()) {
-      due_ns[i] = std::min(due_ns[i], due_ns[i + 1] - least_ns);
+/// By how much a sweep at least arrives before its successor when neither waits: by the LiDAR's
+/// own clock. Nullopt where the one says nothing about the other: a drive or a long gap lies
+/// between them.
+std::optional<Nanoseconds> least_between(const exporter::LoggedSweep& sweep,
+                                         const exporter::LoggedSweep& next,
+                                         const Breaks& run_begins) {
+  const Nanoseconds own_ns = next.stamp_ns - sweep.stamp_ns;
+  if (to_seconds(own_ns) > kLongestBurst_s ||
+      is_between(run_begins, sweep.arrival_ns, next.arrival_ns)) {
+    return std::nullopt;
+  }
+  return static_cast<Nanoseconds>(kLeastShare *
+                                  static_cast<double>(std::max<Nanoseconds>(0, own_ns)));
+}
+
+/// When the sweeps would have arrived if none had waited for another. Sweeps that seem to have
+/// waited for longer than any burst lasts did not: the LiDAR's clock was set.
+std::vector<Nanoseconds> due_of(const SweepsAndScans& there) {
+  const auto& sweeps = there.sweeps;
+  std::vector<Nanoseconds> due_ns;
+  for (const exporter::LoggedSweep& sweep : sweeps) {
+    due_ns.push_back(sweep.arrival_ns);
+  }
+  std::size_t end = sweeps.empty() ? 0 : sweeps.size() - 1;  ///< the newest one of a burst
+  for (std::size_t i = end; i-- > 0;) {
+    const auto least_ns = least_between(sweeps[i], sweeps[i + 1], there.run_begins);
+    if (!least_ns || due_ns[i] <= due_ns[i + 1] - *least_ns) {
+      end = i;
+    } else if (to_seconds(sweeps[end].arrival_ns - sweeps[i].arrival_ns) <= kLongestBurst_s) {
+      due_ns[i] = due_ns[i + 1] - *least_ns;
+    } else {
+      for (; end > i; --end) {
+        due_ns[end] = sweeps[end].arrival_ns;
+      }
     }
   }
   return due_ns;
@@ -69,9 +99,7 @@ std::vector<Nanoseconds> due_of(const std::vector<exporter::LoggedSweep>& sweeps
 class Answers {
  public:
   explicit Answers(const SweepsAndScans& there)
-      : there_(there),
-        due_ns_(due_of(there.sweeps)),
-        interval_ns_(usual_interval_ns(there.sweeps)) {
+      : there_(there), due_ns_(due_of(there)), interval_ns_(usual_interval_ns(there.sweeps)) {
     std::vector<std::vector<std::size_t>> scans_of(there.sweeps.size());
     const Nanoseconds delay_ns = usual_delay_ns();
     for (std::size_t i = first_scan(); i < there.scans.size(); ++i) {
@@ -310,10 +338,45 @@ bool refused_after_newest_scan(const SessionData& data) {
   return *refused > less(newest.scans_received, newest.scans_used);
 }
 
-bool was_mapper_restarted(const SessionData& data) {
-  return std::any_of(data.restarts.begin(), data.restarts.end(), [](const Restart& restart) {
-    return restart.restarted && restart.program.find("lio_mapper") != std::string::npos;
+bool is_of_mapper(const Restart& restart) {
+  return restart.restarted && restart.program.find("lio_mapper") != std::string::npos;
+}
+
+/// Restarts are told by the computer's clock, which is that of the estimates when a robot drives,
+/// and another one when a log is played: so only those within the silence at the end are known.
+Nanoseconds newest_begin_ns(const SessionData& data, const MissedScans& end) {
+  Nanoseconds begin_ns = end.after_ns.value_or(*end.first_ns);
+  for (const Restart& restart : data.restarts) {
+    const Nanoseconds restart_ns = restart.unix_s * kNanosecondsPerSecond;
+    if (is_of_mapper(restart) && restart_ns <= *end.newest_ns) {
+      begin_ns = std::max(begin_ns, restart_ns);
+    }
+  }
+  return begin_ns;
+}
+
+/// Since the newest scan, or since the mapper was started again after it, most sweeps were refused:
+/// then a mapper did come back, and refusals of its predecessor may be what is missing.
+bool came_back_to_refuse(const SessionData& data, const MissedScans& end) {
+  if (!std::any_of(data.restarts.begin(), data.restarts.end(), is_of_mapper)) {
+    return false;
+  }
+  const Nanoseconds begin_ns = newest_begin_ns(data, end);
+  const auto sweeps = std::count_if(data.sweeps.begin(), data.sweeps.end(), [&](const auto& sweep) {
+    return sweep.arrival_ns > begin_ns;
   });
+  return 2 * end.refused >= static_cast<std::uint64_t>(sweeps);
+}
+
+/// Not empty when there are sweeps.
+std::span<const exporter::LoggedSweep> sweeps_of_last_drive(const SessionData& data) {
+  const Breaks begins = data.run_begins();
+  std::size_t first = data.sweeps.size();
+  while (first > 0 && (first == data.sweeps.size() || begins.empty() ||
+                       data.sweeps[first - 1].arrival_ns >= begins.back())) {
+    --first;
+  }
+  return std::span(data.sweeps).subspan(first);
 }
 
 /// The longest ones, in order of time.
@@ -402,19 +465,15 @@ std::string lost_end(const SessionData& data, const std::vector<MissedScans>& mi
     return "";
   }
   const bool was_there = refused_after_newest_scan(data);
-  if (was_there && was_mapper_restarted(data)) {
+  const MissedScans& end = missed.back();
+  if (was_there && came_back_to_refuse(data, end)) {
     return "";
   }
-  const MissedScans& end = missed.back();
+  const auto last_drive = sweeps_of_last_drive(data);
   const double missing_s =
-      static_cast<double>(end.scans) * to_seconds(usual_interval_ns(data.sweeps));
-  const Breaks begins = data.run_begins();
-  const auto of_last_drive =
-      std::count_if(data.sweeps.begin(), data.sweeps.end(), [&](const auto& sweep) {
-        return begins.empty() || sweep.arrival_ns >= begins.back();
-      });
-  const double share_of_drive = static_cast<double>(end.scans) /
-                                static_cast<double>(std::max<std::ptrdiff_t>(1, of_last_drive));
+      static_cast<double>(end.scans) * to_seconds(usual_interval_ns(last_drive));
+  const double share_of_drive =
+      static_cast<double>(end.scans) / static_cast<double>(last_drive.size());
   const bool considerable =
       missing_s > kRestart_s || (missing_s > kOnItsWay_s && share_of_drive >= kConsiderableShare);
   if (!considerable) {
@@ -426,7 +485,7 @@ std::string lost_end(const SessionData& data, const std::vector<MissedScans>& mi
   const std::string why = was_there
                               ? "it was there to the end, and did not receive them or was behind"
                               : "it did not come back before the end, or was that far behind";
-  return std::to_string(end.scans) + " of " + std::to_string(of_last_drive) +
+  return std::to_string(end.scans) + " of " + std::to_string(last_drive.size()) +
          " sweeps were never answered by the mapper, " +
          (end.after_ns ? when + why : std::string("from the first to the last")) +
          ". What was driven then is not in the map.";

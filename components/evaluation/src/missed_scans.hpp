@@ -55,8 +55,7 @@ std::string print_missed(const SessionData& data, const std::vector<MissedScans>
 
 /// A sentence when at the end more sweeps were never answered than a restart takes, or a
 /// considerable part of the drive; else empty. Also empty when a mapper that was started again
-/// refused sweeps after the newest scan: it came back, and what its predecessor had refused nobody
-/// knows.
+/// refused most sweeps since then: it came back, and what its predecessor had refused nobody knows.
 std::string lost_end(const SessionData& data, const std::vector<MissedScans>& missed);
 
 }  // namespace trigpoint::evaluation

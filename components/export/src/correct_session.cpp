@@ -117,7 +117,7 @@ PastSettings past_settings_of(const std::string& session) {
   }
 }
 
-GraphInput graph_input_of(const std::string& session) {
+GraphInput graph_input_of(const std::string& session, DamagedAlignment damaged) {
   GraphInput input;
   input.drift = past_settings_of(session).drift;
   KeyframeReader store(path_in(session, session_file::kKeyframes));
@@ -127,7 +127,13 @@ GraphInput graph_input_of(const std::string& session) {
   store.visit_rows([&](const lio_mapper::StoredRow& row) { input.rows.push_back(row); });
   const std::string alignment = path_in(session, session_file::kAlignment);
   if (fs::exists(alignment)) {
-    input.fallback = read_alignment(alignment).alignment;
+    try {
+      input.fallback = read_alignment(alignment).alignment;
+    } catch (const std::runtime_error&) {
+      if (damaged == DamagedAlignment::kIsError) {
+        throw;
+      }
+    }
   }
   const std::string lio = path_in(session, session_file::kLio);
   if (fs::exists(lio) && !input.keyframes.empty()) {

@@ -17,7 +17,6 @@
 
 #include <chrono>
 #include <optional>
-#include <stdexcept>
 #include <string>
 
 namespace {
@@ -153,14 +152,12 @@ class Process {
     take(core_.on_lio_status(status));
   }
 
-  /// A damaged one (a power failure leaves empty files) is heard again from the GPS filter.
   void adopt_stored_datum(const std::string& session) {
-    try {
-      if (const auto stored = pipeline::stored_datum(session)) {
-        adopt(*stored);
-      }
-    } catch (const std::runtime_error& damaged) {
-      log_.warning(std::string(damaged.what()) + "; going on as if it had not been there");
+    Events events;
+    const auto stored = pipeline::stored_datum(session, events);
+    log_(events);
+    if (stored) {
+      adopt(*stored);
     }
   }
 

@@ -73,9 +73,8 @@ class Process {
     if (!options.session.empty()) {
       exporter::create_session_folder(options.session);
       session_.emplace(options.session, exporter::Opening::kContinue);
-      if (const auto stored = pipeline::stored_datum(options.session)) {
-        take(core_.on_datum(*stored));
-      }
+      log_(session_->take_events());
+      adopt_stored_datum(options.session);
     }
     publish_datum();
     datums_.emplace(
@@ -111,6 +110,15 @@ class Process {
   bool failed() const { return disk_.failed(); }
 
  private:
+  void adopt_stored_datum(const std::string& session) {
+    Events events;
+    const auto stored = pipeline::stored_datum(session, events);
+    log_(events);
+    if (stored) {
+      take(core_.on_datum(*stored));
+    }
+  }
+
   /// Only while the core wants it: other filters, and the gate that keeps the newest odometry of a
   /// filter that has died.
   void listen_to_others(bus::Loop& loop) {

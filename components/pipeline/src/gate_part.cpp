@@ -2,6 +2,8 @@
 // Copyright the Trigpoint developers
 #include "trigpoint/pipeline/session_parts.hpp"
 
+#include "damaged_files.hpp"
+
 #include <filesystem>
 #include <stdexcept>
 #include <utility>
@@ -15,28 +17,13 @@ namespace {
 
 constexpr double kRewriteAfter_s = 3.0;
 
-Event warning_of(const std::runtime_error& damaged, const std::string& what) {
-  return {Severity::kWarning, 0, "session_file_damaged", std::string(damaged.what()) + "; " + what};
-}
-
-exporter::CountsWriter open_counts(const std::string& session,
-                                   exporter::Opening opening,
-                                   Events& events) {
-  try {
-    return {session, "fusion_gate", opening};
-  } catch (const std::runtime_error& damaged) {
-    events.push_back(warning_of(damaged, "the gate's counts begin anew"));
-    return {session, "fusion_gate", exporter::Opening::kFresh};
-  }
-}
-
 }  // namespace
 
 GatePart::GatePart(const std::string& session, exporter::Opening opening)
     : session_(session),
       trajectory_(path_in(session, file::kFused), "base_link in map, as published online", opening),
       gate_log_(path_in(session, file::kGate), opening),
-      counts_(open_counts(session, opening, events_)) {
+      counts_(open_counts(session, "fusion_gate", opening, events_)) {
   const std::string alignment = path_in(session, file::kAlignment);
   if (opening == exporter::Opening::kContinue && std::filesystem::exists(alignment)) {
     try {

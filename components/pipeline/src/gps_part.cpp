@@ -2,6 +2,10 @@
 // Copyright the Trigpoint developers
 #include "trigpoint/pipeline/session_parts.hpp"
 
+#include "damaged_files.hpp"
+
+#include <utility>
+
 namespace trigpoint::pipeline {
 
 namespace file = exporter::session_file;
@@ -11,7 +15,11 @@ GpsPart::GpsPart(const std::string& session, exporter::Opening opening)
     : session_(session),
       trajectory_(path_in(session, file::kGps), "base_link in map, GPS odometry", opening),
       statuses_(path_in(session, file::kGpsStatus), opening),
-      counts_(session, "gps_odometry", opening) {}
+      counts_(open_counts(session, "gps_odometry", opening, events_)) {}
+
+Events GpsPart::take_events() {
+  return std::exchange(events_, {});
+}
 
 void GpsPart::on_odometry(const Odometry& odometry) {
   trajectory_.append(odometry.stamp_ns, odometry.T_frame_child);

@@ -2,8 +2,11 @@
 // Copyright the Trigpoint developers
 #include "trigpoint/pipeline/session_parts.hpp"
 
+#include "damaged_files.hpp"
+
 #include <filesystem>
 #include <stdexcept>
+#include <utility>
 #include <variant>
 
 namespace trigpoint::pipeline {
@@ -35,7 +38,11 @@ LogPart::LogPart(const std::string& session, exporter::Opening opening)
       opening_(opening),
       fixes_(path_in(session, file::kFixes), opening),
       sweep_log_(path_in(session, file::kSweeps), opening),
-      counts_(session, "log", opening) {}
+      counts_(open_counts(session, "log", opening, events_)) {}
+
+Events LogPart::take_events() {
+  return std::exchange(events_, {});
+}
 
 void LogPart::on_entry(const recording::LogEntry& entry) {
   first_ns_ = first_ns_.value_or(entry.receive_ns);
@@ -83,10 +90,7 @@ double LogPart::data_s() const {
 }
 
 void LogPart::close(const recording::LogReader& log) {
-  for (const Moment& sweep : early_sweeps_) {  // no IMU, so no estimates: any clock does
-    write(sweep, {sweep.receive_ns, sweep.receive_ns});
-  }
-  early_sweeps_.clear();
+  write_without_imu();
   const auto undecodable = [&](const std::string& input) {
     std::uint64_t count = 0;
     for (const recording::Undecodable& skipped : log.undecodable()) {
@@ -119,25 +123,43 @@ void LogPart::close(const recording::LogReader& log) {
   counts_.write(counts);
 }
 
-std::optional<Event> LogPart::keep_truth(const recording::LogReader& log) const {
+/// Without IMU there are no estimates, so that any clock does; but a file that goes on is on one.
+void LogPart::write_without_imu() {
+  if (opening_ == exporter::Opening::kFresh) {
+    for (const Moment& sweep : early_sweeps_) {
+      write(sweep, {sweep.receive_ns, sweep.receive_ns});
+    }
+  } else if (!early_sweeps_.empty()) {
+    events_.push_back({Severity::kWarning,
+                       last_ns_.value_or(0),
+                       "sweeps_left_out",
+                       "The log has no IMU sample, so nobody knows when its " +
+                           std::to_string(early_sweeps_.size()) +
+                           " sweeps arrived on the clock of the session: they are not added to " +
+                           path_in(session_, file::kSweeps) + "."});
+  }
+  early_sweeps_.clear();
+}
+
+void LogPart::keep_truth(const recording::LogReader& log) {
   const std::string kept = path_in(session_, file::kTruth);
   const auto truth = log.truth_file();
   if (!truth || *truth == kept) {
-    return std::nullopt;
+    return;
   }
   if (opening_ != exporter::Opening::kContinue || !std::filesystem::exists(kept)) {
     exporter::copy_file(*truth, kept);
-    return std::nullopt;
+    return;
   }
   exporter::Trajectory later;
   try {
     later = later_truth(*truth, kept);
   } catch (const std::runtime_error& damaged) {
-    return Event{Severity::kWarning,
-                 last_ns_.value_or(0),
-                 "truth_left_out",
-                 std::string(damaged.what()) + "; nothing of " + *truth + " is added to " + kept +
-                     ", and what was driven is not scored against it"};
+    events_.push_back({Severity::kWarning,
+                       last_ns_.value_or(0),
+                       "truth_left_out",
+                       std::string(damaged.what()) + "; nothing of " + *truth + " is added to " +
+                           kept + ", and what was driven is not scored against it"});
   }
   if (!later.empty()) {
     exporter::TrajectoryWriter writer(kept, "base_link in map", exporter::Opening::kContinue);
@@ -145,7 +167,6 @@ std::optional<Event> LogPart::keep_truth(const recording::LogReader& log) const 
       writer.append(pose.stamp_ns, pose.pose);
     }
   }
-  return std::nullopt;
 }
 
 }  // namespace trigpoint::pipeline

@@ -81,9 +81,8 @@ class MapRun {
     }
     session_.emplace(options_.session, options_.use);
     session_->correct_past_of(cores_, options_.use);
-    if (const auto left_out = session_->keep_truth(log)) {
-      tell({*left_out}, options_.on_event);
-    }
+    session_->keep_truth(log);
+    tell(session_->take_events(), options_.on_event);
     exporter::write_text(session_->path(file::kConfig), options_.config_text);
     start_ = Clock::now();
     write_run();  // a run that is killed says at least what it was
@@ -107,6 +106,7 @@ class MapRun {
     tell(log.take_events(), options_.on_event);
     tell(recording::undecodable_events(log), options_.on_event);
     session_->close(cores_, log);
+    tell(session_->take_events(), options_.on_event);
     result_.stopped = stopped;
     result_.log_error = log_error;
     result_.sweeps_in_log = session_->log().sweeps();

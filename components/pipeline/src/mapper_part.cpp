@@ -3,7 +3,10 @@
 #include "trigpoint/base/config.hpp"
 #include "trigpoint/pipeline/session_parts.hpp"
 
+#include "damaged_files.hpp"
+
 #include <filesystem>
+#include <stdexcept>
 
 namespace trigpoint::pipeline {
 
@@ -18,12 +21,23 @@ exporter::Opening opening_of(bool goes_on) {
 
 }  // namespace
 
-std::optional<Datum> stored_datum(const std::string& session) {
+std::optional<Datum> read_stored_datum(const std::string& session) {
   const std::string datum = path_in(session, file::kDatum);
   if (!std::filesystem::exists(datum)) {
     return std::nullopt;
   }
   return exporter::read_datum(datum);
+}
+
+std::optional<Datum> stored_datum(const std::string& session, Events& events) {
+  try {
+    return read_stored_datum(session);
+  } catch (const std::runtime_error& damaged) {
+    events.push_back(warning_of(damaged,
+                                "going on as if it had not been there: unless another program "
+                                "still has the datum, a new one is elected, and `map` lies there"));
+    return std::nullopt;
+  }
 }
 
 std::optional<lio_mapper::Checkpoint> stored_checkpoint(const std::string& session) {
@@ -50,7 +64,6 @@ StoredSession open_stored_session(const std::string& session) {
   stored.checkpoint = *checkpoint;
   stored.points = lio_mapper::stored_points_of(store);
   stored.first_pose = reader.first_pose(checkpoint->odom_epoch);
-  stored.datum = stored_datum(session);
   return stored;
 }
 

@@ -69,6 +69,14 @@ void OfflineSession::close(Lockstep& cores, const recording::LogReader& log) {
   log_.close(log);
 }
 
+Events OfflineSession::take_events() {
+  Events all = gps_.take_events();
+  for (const Events& events : {gate_.take_events(), log_.take_events()}) {
+    all.insert(all.end(), events.begin(), events.end());
+  }
+  return all;
+}
+
 void OfflineSession::write(const Step& step) {
   for (const Odometry& odometry : step.gps_odometry) {
     gps_.on_odometry(odometry);

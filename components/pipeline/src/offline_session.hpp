@@ -33,9 +33,10 @@ class OfflineSession {
 
   void close(Lockstep& cores, const recording::LogReader& log);
 
-  [[nodiscard]] std::optional<Event> keep_truth(const recording::LogReader& log) const {
-    return log_.keep_truth(log);
-  }
+  void keep_truth(const recording::LogReader& log) { log_.keep_truth(log); }
+
+  /// What the parts warn of: before the first step and after close().
+  Events take_events();
 
   const LogPart& log() const { return log_; }
 

@@ -97,7 +97,9 @@ struct Outcome {
 
 GraphInput stored_past(const std::string& session) {
   const std::string store = exporter::path_in(session, exporter::session_file::kKeyframes);
-  return std::filesystem::exists(store) ? exporter::graph_input_of(session) : GraphInput{};
+  return std::filesystem::exists(store)
+             ? exporter::graph_input_of(session, exporter::DamagedAlignment::kIsNone)
+             : GraphInput{};
 }
 
 struct PastBeside::Impl {

@@ -151,6 +151,67 @@ TEST(UnansweredSweeps, are_not_those_that_came_in_a_burst) {
   EXPECT_EQ(missed[0].scans, 7U);
 }
 
+/// Seconds from sweep k to the next one; also of the LiDAR's own stamps when there are none.
+using Interval = std::function<double(int)>;
+
+/// Every one answered, 3 ms after its last point.
+Drive rhythm(int count, const Interval& interval_s, const Interval& by_stamps_s = {}) {
+  Drive made;
+  Nanoseconds end_ns = kStart_ns;
+  Nanoseconds stamp_ns = kStart_ns - kInterval_ns;
+  for (int k = 0; k < count; ++k) {
+    made.sweeps.push_back({stamp_ns, end_ns + 3'000'000, end_ns + 3'000'000});
+    auto& scan = made.scans.emplace_back();
+    scan.status.stamp_ns = end_ns;
+    scan.status.scans_received = scan.status.scans_used = made.scans.size();
+    end_ns += from_seconds(interval_s(k));
+    stamp_ns += from_seconds((by_stamps_s ? by_stamps_s : interval_s)(k));
+  }
+  return made;
+}
+
+/// Whether in two drives, in one, by loss, or from sweep to sweep.
+TEST(UnansweredSweeps, are_none_where_the_interval_is_not_always_the_same) {
+  const double day_s = 86'400.0;
+  const auto rate_of_day = [&](int k) { return k == 2999 ? day_s : k < 3000 ? 0.05 : 0.1; };
+  const Drive days = rhythm(7000, rate_of_day);
+  EXPECT_THAT(missed_in(days), IsEmpty());
+  const Breaks second_day{days.sweeps[3000].arrival_ns - kInterval_ns};
+  EXPECT_THAT(find_unanswered_sweeps({days.sweeps, days.scans, 0, second_day}), IsEmpty());
+  const Interval no_clock = [](int) { return 0.0; };
+  EXPECT_THAT(missed_in(rhythm(7000, rate_of_day, no_clock)), IsEmpty());
+  EXPECT_THAT(missed_in(rhythm(5000, [](int k) { return k < 3000 ? 0.1 : 0.05; })), IsEmpty());
+  EXPECT_THAT(missed_in(rhythm(5000, [](int k) { return k < 2000 ? 0.05 : 0.1; })), IsEmpty());
+  EXPECT_THAT(missed_in(rhythm(3000, [](int k) { return k * 55 % 100 < 55 ? 0.2 : 0.1; })),
+              IsEmpty());
+  const auto nine = [](int k) { return k % 9 == 8 ? 0.084 : 0.102; };
+  EXPECT_THAT(missed_in(rhythm(6000, nine)), IsEmpty());
+  EXPECT_THAT(missed_in(rhythm(
+                  6000, [](int) { return 0.1; }, nine)),
+              IsEmpty());
+}
+
+TEST(UnansweredSweeps, are_none_where_the_clock_of_the_lidar_is_set) {
+  const auto even = [](int) { return 0.1; };
+  for (const double step_s : {-3600.0, -0.35, 0.35, 2.0, 3600.0}) {
+    EXPECT_THAT(missed_in(rhythm(2000, even, [&](int k) { return k == 999 ? 0.1 + step_s : 0.1; })),
+                IsEmpty())
+        << step_s;
+  }
+}
+
+TEST(UnansweredSweeps, are_found_beside_a_burst_at_another_rate) {
+  Drive made = rhythm(7000, [](int k) { return k < 4000 ? 0.1 : 0.05; });
+  for (std::size_t k = 6000; k < 6030; ++k) {
+    made.sweeps[k].arrival_ns = made.sweeps[6030].arrival_ns;
+  }
+  EXPECT_THAT(missed_in(made), IsEmpty());
+  made.scans.erase(made.scans.begin() + 6010, made.scans.begin() + 6017);
+  const auto missed = missed_in(made);
+  ASSERT_EQ(missed.size(), 1U);
+  EXPECT_EQ(missed[0].scans, 7U);
+}
+
 /// A scan with too few matches is refused and has a row: it explains no other one.
 TEST(UnansweredSweeps, are_not_explained_by_a_refused_scan_that_has_a_row) {
   Drive made = drive(100, [](int k) { return k < 40 || k >= 47; });
@@ -216,10 +277,10 @@ void make_lost_end(const ScratchFolder& folder, int last) {
   }
 }
 
-void write_restart(const ScratchFolder& folder) {
+void write_restart(const ScratchFolder& folder, std::int64_t unix_s = 1'700'000'000) {
   write_all(folder.file("restarts.csv"),
-            "unix_s,program,restarted,lived_s,what\n"
-            "1700000000,trigpoint_lio_mapper,1,23.1,\"was killed by signal 9 (Killed)\"\n");
+            "unix_s,program,restarted,lived_s,what\n" + std::to_string(unix_s) +
+                ",trigpoint_lio_mapper,1,23.1,\"was killed by signal 9 (Killed)\"\n");
 }
 
 /// Refused for `no_points`, as the mapper counted when it ended.
@@ -276,6 +337,63 @@ TEST(Report, does_not_fail_for_what_a_mapper_refused_that_died_when_the_next_one
   const ReportResult result = write_report(folder.path(), kTextOnly);
   EXPECT_THAT(result.failures, Not(Contains(HasSubstr("never answered"))));
   EXPECT_THAT(result.text, HasSubstr("Scans missed: 150 of the 1201 sweeps"));
+}
+
+/// It dies at 115 s: what the next one refuses is all that there is since.
+TEST(Report,
+     does_not_fail_for_a_mapper_that_refused_all_since_it_came_back_shortly_before_the_end) {
+  const ScratchFolder folder;
+  make_lost_end(folder, 600);
+  write_refused(folder, 601, 45);
+  write_restart(folder, 1'700'000'115);
+  EXPECT_THAT(write_report(folder.path(), kTextOnly).failures,
+              Not(Contains(HasSubstr("never answered"))));
+}
+
+/// Killed at 5 s and back at 8 s, behind by 30 s at the end, which it ends with an empty cloud; or
+/// killed when it was behind by 20 s, and none but that cloud was answered by the next one.
+TEST(Report, fails_for_a_backlog_at_the_end_also_when_one_sweep_of_it_was_refused) {
+  for (const std::int64_t restart_s : {1'700'000'005, 1'700'000'110}) {
+    const ScratchFolder folder;
+    make_lost_end(folder, test::kScans - 300);
+    write_refused(folder, test::kScans - 299, 1);
+    write_restart(folder, restart_s);
+    EXPECT_THAT(write_report(folder.path(), kTextOnly).failures,
+                Contains(HasSubstr("299 of 1201 sweeps were never answered")));
+  }
+}
+
+/// Every sweep of the first drive was answered, and of the second one, at 20 Hz, all but the newest
+/// `missing`.
+SessionData faster_on_last_day(int count, std::size_t missing, bool has_clock) {
+  SessionData data;
+  const auto rate = [](int k) { return k < 3000 ? 0.1 : k == 3000 ? 86'400.0 : 0.05; };
+  const Interval none = [](int) { return 0.0; };
+  Drive made = rhythm(count, rate, has_clock ? Interval(rate) : none);
+  data.sweeps = std::move(made.sweeps);
+  data.scans = std::move(made.scans);
+  data.scans.resize(data.scans.size() - missing);
+  data.has_scan_log = true;
+  const Nanoseconds begin_ns = data.sweeps[3001].arrival_ns - kInterval_ns;
+  data.run.emplace().begin_ns = begin_ns;
+  data.run->before.emplace_back().begin_ns = kStart_ns;
+  return data;
+}
+
+std::string lost_end_of(const SessionData& data) {
+  return lost_end(data, missed_scans_of(data));
+}
+
+TEST(LostEnd, is_as_long_as_the_last_drive_took_for_it) {
+  EXPECT_THAT(lost_end_of(faster_on_last_day(5000, 31, true)), IsEmpty());
+  EXPECT_THAT(lost_end_of(faster_on_last_day(5000, 31, false)), IsEmpty());
+  EXPECT_THAT(lost_end_of(faster_on_last_day(5000, 70, true)),
+              HasSubstr("70 of 1999 sweeps were never answered"));
+}
+
+TEST(LostEnd, is_found_where_the_lidar_has_no_clock) {
+  EXPECT_THAT(lost_end_of(faster_on_last_day(5000, 70, false)),
+              HasSubstr("70 of 1999 sweeps were never answered"));
 }
 
 TEST(Report, fails_when_a_mapper_that_was_there_did_not_answer_at_the_end) {

@@ -165,12 +165,16 @@ Entries entries_between(double from_s, double to_s) {
 MapLogResult map_into(const std::string& session,
                       const Entries& entries,
                       UseOfStored use = UseOfStored::kNothing,
-                      const std::string& stored = {}) {
+                      const std::string& stored = {},
+                      Events* events = nullptr) {
   StoredLog log(entries);
   MapLogOptions options;
   options.session = session;
   options.use = use;
-  options.on_event = [](const Event& event) {
+  options.on_event = [events](const Event& event) {
+    if (events != nullptr) {
+      events->push_back(event);
+    }
     if (event.code == "lio_not_resumed") {
       ADD_FAILURE() << event.text;
     }
@@ -210,6 +214,29 @@ TEST(MapLogResume, appends_to_the_session_and_goes_on_counting) {
   EXPECT_NEAR(to_seconds(*runs[1].begin_ns - runs[0].begin_ns.value()), 4.5, 0.02);
   EXPECT_EQ(exporter::read_sweeps(folder.file("sweeps.csv")).size(),
             exporter::read_trajectory(folder.file("lio.tum")).size());
+}
+
+/// A power failure leaves files of no bytes.
+TEST(MapLogResume, goes_on_from_damaged_files_and_says_which) {
+  const ScratchFolder folder;
+  map_into(folder.path(), entries_between(0.0, 4.0));
+  test::write_all(folder.file("alignment.yaml"), "");
+  test::write_all(folder.file("datum.yaml"), "");  // not of the mapper, which must start
+  for (const std::string program : {"fusion_gate", "gps_odometry", "log"}) {
+    test::write_all(folder.file(program + ".counts.yaml"), "fix: [\n");
+  }
+  Events events;
+  map_into(folder.path(), entries_between(4.5, 7.0), UseOfStored::kResume, folder.path(), &events);
+  std::string warned;
+  for (const Event& event : events) {
+    warned += event.code == "session_file_damaged" ? event.text + "\n" : "";
+  }
+  for (const char* file : {"alignment.yaml",
+                           "fusion_gate.counts.yaml",
+                           "gps_odometry.counts.yaml",
+                           "log.counts.yaml"}) {
+    EXPECT_NE(warned.find(file), std::string::npos) << file << " is not in:\n" << warned;
+  }
 }
 
 PlaceTrial try_later_entries(const StoredSession& stored, double to_s = 7.0) {

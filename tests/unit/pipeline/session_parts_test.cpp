@@ -15,6 +15,7 @@ namespace {
 using test::read_all;
 using test::ScratchFolder;
 using test::write_all;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 Alignment at_x(double x_m, std::uint32_t odom_epoch = 0) {
@@ -102,6 +103,35 @@ TEST(GatePart, begins_anew_and_says_so_where_what_it_goes_on_from_is_damaged) {
   EXPECT_FALSE(kept_in(folder).was_admitted);
 }
 
+TEST(GpsPart, begins_its_counts_anew_and_says_so_where_they_are_damaged) {
+  const ScratchFolder folder;
+  write_all(folder.file("gps_odometry.counts.yaml"), "fix.received: [\n");
+  GpsPart part(folder.path(), exporter::Opening::kContinue);
+  const Events events = part.take_events();
+  ASSERT_EQ(events.size(), 1U);
+  EXPECT_EQ(events[0].severity, Severity::kWarning);
+  EXPECT_THAT(events[0].text, HasSubstr("gps_odometry.counts.yaml"));
+  part.keep_counts({});
+  EXPECT_FALSE(exporter::read_counts(folder.file("gps_odometry.counts.yaml")).empty());
+}
+
+TEST(StoredDatum, that_is_damaged_counts_for_none_with_a_warning_where_a_program_must_start) {
+  const ScratchFolder folder;
+  Events events;
+  EXPECT_FALSE(stored_datum(folder.path(), events));
+  EXPECT_TRUE(events.empty());
+  write_all(folder.file("datum.yaml"), "");
+  EXPECT_FALSE(stored_datum(folder.path(), events));
+  EXPECT_THROW(read_stored_datum(folder.path()), std::runtime_error);
+  ASSERT_EQ(events.size(), 1U);
+  EXPECT_EQ(events[0].severity, Severity::kWarning);
+  EXPECT_THAT(events[0].text, HasSubstr("datum.yaml"));
+  const Datum datum{43.0, -78.0, 100.0};
+  exporter::write_datum(folder.file("datum.yaml"), datum);
+  EXPECT_EQ(stored_datum(folder.path(), events).value().id(), datum.id());
+  EXPECT_EQ(events.size(), 1U);
+}
+
 TEST(GatePart, writes_nothing_while_nobody_knows_an_alignment) {
   const ScratchFolder folder;
   GatePart part(folder.path());
@@ -175,15 +205,40 @@ const std::string kHead = "# datum 43.0 -78.0 100.0\n";
 const std::string kDayOne = "1.000000000 1 0 0 0 0 0 1\n2.000000000 2 0 0 0 0 0 1\n";
 const std::string kDayTwo = "86401.500000000 5 0 0 0 0 0 1\n";
 
+/// The second day's log has no IMU: its sweeps are on another clock than those of the first.
+TEST(LogPart, leaves_out_sweeps_without_imu_of_a_session_that_goes_on_and_says_so) {
+  const ScratchFolder folder;
+  const LogWithTruth log("");
+  const auto sweeps = [&] { return exporter::read_sweeps(folder.file("sweeps.csv")); };
+  {
+    LogPart part(folder.path());
+    receive(part, 1000, PointCloudMessage{}, 990);
+    part.close(log);
+    EXPECT_TRUE(part.take_events().empty());
+    ASSERT_EQ(sweeps().size(), 1U);
+    EXPECT_EQ(sweeps()[0].arrival_ns, 1000);
+  }
+  LogPart part(folder.path(), exporter::Opening::kContinue);
+  receive(part, 5000, PointCloudMessage{}, 4990);
+  receive(part, 5100, PointCloudMessage{}, 5090);
+  part.close(log);
+  EXPECT_EQ(sweeps().size(), 1U);
+  const Events events = part.take_events();
+  ASSERT_EQ(events.size(), 1U);
+  EXPECT_EQ(events[0].severity, Severity::kWarning);
+  EXPECT_THAT(events[0].text, AllOf(HasSubstr("its 2 sweeps"), HasSubstr("sweeps.csv")));
+}
+
 TEST(LogPart, appends_the_truth_of_a_later_day_to_that_of_the_session) {
   const ScratchFolder folder;
   const ScratchFolder logs;
   write_all(logs.file("one.tum"), kHead + kDayOne);
   write_all(logs.file("two.tum"), kHead + kDayTwo);
-  EXPECT_FALSE(LogPart(folder.path()).keep_truth(LogWithTruth(logs.file("one.tum"))));
-  const LogPart resumed(folder.path(), exporter::Opening::kContinue);
-  EXPECT_FALSE(resumed.keep_truth(LogWithTruth(logs.file("two.tum"))));
-  EXPECT_FALSE(resumed.keep_truth(LogWithTruth(logs.file("two.tum"))));  // at the end once more
+  LogPart(folder.path()).keep_truth(LogWithTruth(logs.file("one.tum")));
+  LogPart resumed(folder.path(), exporter::Opening::kContinue);
+  resumed.keep_truth(LogWithTruth(logs.file("two.tum")));
+  resumed.keep_truth(LogWithTruth(logs.file("two.tum")));  // at the end once more
+  EXPECT_TRUE(resumed.take_events().empty());
   const std::string whole = read_all(folder.file("truth.tum"));
   EXPECT_TRUE(whole.starts_with(kHead + kDayOne));
   const auto poses = exporter::read_trajectory(folder.file("truth.tum"));
@@ -197,9 +252,10 @@ TEST(LogPart, appends_only_what_is_later_of_a_truth_with_blank_lines_and_indente
   const ScratchFolder logs;
   write_all(logs.file("one.tum"), kHead + kDayOne);
   write_all(logs.file("two.tum"), "  \n # a comment\n" + kDayOne + kDayTwo);
-  EXPECT_FALSE(LogPart(folder.path()).keep_truth(LogWithTruth(logs.file("one.tum"))));
-  EXPECT_FALSE(LogPart(folder.path(), exporter::Opening::kContinue)
-                   .keep_truth(LogWithTruth(logs.file("two.tum"))));
+  LogPart(folder.path()).keep_truth(LogWithTruth(logs.file("one.tum")));
+  LogPart resumed(folder.path(), exporter::Opening::kContinue);
+  resumed.keep_truth(LogWithTruth(logs.file("two.tum")));
+  EXPECT_TRUE(resumed.take_events().empty());
   EXPECT_EQ(exporter::read_trajectory(folder.file("truth.tum")).size(), 3U);
 }
 
@@ -208,12 +264,13 @@ TEST(LogPart, leaves_out_a_truth_that_cannot_be_read_and_says_so) {
   const ScratchFolder logs;
   write_all(logs.file("one.tum"), kHead + kDayOne);
   write_all(logs.file("two.tum"), kDayTwo + kDayTwo);  // one stamp twice
-  EXPECT_FALSE(LogPart(folder.path()).keep_truth(LogWithTruth(logs.file("one.tum"))));
-  const auto left_out = LogPart(folder.path(), exporter::Opening::kContinue)
-                            .keep_truth(LogWithTruth(logs.file("two.tum")));
-  ASSERT_TRUE(left_out);
-  EXPECT_EQ(left_out->severity, Severity::kWarning);
-  EXPECT_THAT(left_out->text, HasSubstr("two.tum:2"));
+  LogPart(folder.path()).keep_truth(LogWithTruth(logs.file("one.tum")));
+  LogPart resumed(folder.path(), exporter::Opening::kContinue);
+  resumed.keep_truth(LogWithTruth(logs.file("two.tum")));
+  const Events left_out = resumed.take_events();
+  ASSERT_EQ(left_out.size(), 1U);
+  EXPECT_EQ(left_out[0].severity, Severity::kWarning);
+  EXPECT_THAT(left_out[0].text, HasSubstr("two.tum:2"));
   EXPECT_EQ(read_all(folder.file("truth.tum")), kHead + kDayOne);
 }
 
@@ -222,9 +279,10 @@ TEST(LogPart, appends_no_truth_in_another_frame) {
   const ScratchFolder logs;
   write_all(logs.file("one.tum"), kHead + kDayOne);
   write_all(logs.file("two.tum"), "# datum 43.1 -78.0 100.0\n" + kDayTwo);
-  EXPECT_FALSE(LogPart(folder.path()).keep_truth(LogWithTruth(logs.file("one.tum"))));
-  EXPECT_FALSE(LogPart(folder.path(), exporter::Opening::kContinue)
-                   .keep_truth(LogWithTruth(logs.file("two.tum"))));
+  LogPart(folder.path()).keep_truth(LogWithTruth(logs.file("one.tum")));
+  LogPart resumed(folder.path(), exporter::Opening::kContinue);
+  resumed.keep_truth(LogWithTruth(logs.file("two.tum")));
+  EXPECT_TRUE(resumed.take_events().empty());
   EXPECT_EQ(read_all(folder.file("truth.tum")), kHead + kDayOne);
 }
 

@@ -30,8 +30,16 @@ struct PastSettings {
 /// Throws std::runtime_error naming file, line, key and rule when a value is not what it must be.
 PastSettings past_settings_of(const std::string& session);
 
-/// Keyframes, rows, lio.tum and the alignment of a session.
-lio_mapper::GraphInput graph_input_of(const std::string& session);
+/// What an alignment.yaml that cannot be read is (a power failure leaves empty files).
+enum class DamagedAlignment {
+  kIsError,
+  kIsNone  ///< as if it were not there: for who must start all the same
+};
+
+/// Keyframes, rows, lio.tum and the alignment of a session. Throws std::runtime_error naming the
+/// file and the cause.
+lio_mapper::GraphInput graph_input_of(const std::string& session,
+                                      DamagedAlignment damaged = DamagedAlignment::kIsError);
 
 /// Solves, and writes keyframes.tum and, when there is a map frame, fused_smoothed.tum; those of an
 /// earlier solution are removed first. Throws std::runtime_error naming the file and the cause.

@@ -14,7 +14,8 @@
 
 namespace trigpoint::pipeline {
 
-/// What a session folder that goes on holds of its past, as a mapper wants it.
+/// What a session folder that goes on holds of its past, as a mapper wants it. A damaged alignment
+/// counts for none: the gate, whose file it is, warns of it.
 lio_mapper::GraphInput stored_past(const std::string& session);
 
 struct PastBesideOptions {

@@ -23,8 +23,11 @@ namespace trigpoint::pipeline {
 /// gps.tum, gps_status.csv, datum.yaml and the filter's counts.
 class GpsPart {
  public:
+  /// Goes on (`Opening::kContinue`) from the counts that the session has, unless they are damaged.
   explicit GpsPart(const std::string& session,
                    exporter::Opening opening = exporter::Opening::kFresh);
+  /// Warnings about what was damaged, once.
+  Events take_events();
   void on_odometry(const Odometry& odometry);
   void on_status(const GpsStatus& status);
   void on_datum(const Datum& datum);
@@ -33,13 +36,19 @@ class GpsPart {
 
  private:
   std::string session_;
+  Events events_;
   exporter::TrajectoryWriter trajectory_;
   exporter::GpsStatusLog statuses_;
   exporter::CountsWriter counts_;
 };
 
-/// The datum that is stored in a session folder, if any.
-std::optional<Datum> stored_datum(const std::string& session);
+/// The datum that is stored in a session folder, if any. Throws std::runtime_error when the file is
+/// damaged.
+std::optional<Datum> read_stored_datum(const std::string& session);
+
+/// For a program on the bus, which must start all the same: a damaged file (a power failure leaves
+/// empty ones) counts for none, and `events` gets a warning.
+std::optional<Datum> stored_datum(const std::string& session, Events& events);
 
 /// The checkpoint that a mapper left in a session folder, if any.
 std::optional<lio_mapper::Checkpoint> stored_checkpoint(const std::string& session);
@@ -49,7 +58,6 @@ struct StoredSession {
   lio_mapper::Checkpoint checkpoint;
   lio_mapper::StoredPoints points;
   std::optional<Pose> first_pose;  ///< of the checkpoint's odom epoch
-  std::optional<Datum> datum;
 };
 
 /// Throws ConfigError that says what the folder lacks, and what KeyframeReader throws.
@@ -120,15 +128,18 @@ class LogPart {
  public:
   explicit LogPart(const std::string& session,
                    exporter::Opening opening = exporter::Opening::kFresh);
+  /// Warnings about what was damaged or left out, once.
+  Events take_events();
   /// sweeps.csv gets the sweeps before the first IMU sample when that has come.
   void on_entry(const recording::LogEntry& entry);
-  /// `log` is what the entries came from; it knows what it passed over.
+  /// `log` is what the entries came from; it knows what it passed over. Sweeps of a log without IMU
+  /// are on the clock of the receiver: a session that goes on leaves them out, with a warning.
   void close(const recording::LogReader& log);
   /// Copies the truth that lies beside the log, if any; for scoring only. A session that goes on
   /// keeps the truth that it has, and what is later is appended: unless the two are in `map` at
   /// different datums, since then the new one is in another frame. A truth that cannot be read is
   /// no reason to stop: nothing of it is appended, and a warning says why.
-  [[nodiscard]] std::optional<Event> keep_truth(const recording::LogReader& log) const;
+  void keep_truth(const recording::LogReader& log);
 
   /// From the first to the newest entry.
   double data_s() const;
@@ -151,8 +162,10 @@ class LogPart {
   void on_imu(Moment sample);
   void on_sweep(Moment sweep);
   void write(Moment sweep, Moment imu);
+  void write_without_imu();
 
   std::string session_;
+  Events events_;
   exporter::Opening opening_;
   exporter::FixLog fixes_;
   exporter::SweepLog sweep_log_;
