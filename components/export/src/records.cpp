@@ -337,6 +337,9 @@ void CountsWriter::write(const std::vector<NamedCount>& counts) const {
 
 std::vector<NamedCount> read_counts(const std::string& file) {
   const Record record(file);
+  if (std::filesystem::file_size(file) == 0) {  // a file without a count has its comment
+    throw std::runtime_error(file + ": empty, which no program leaves: what it counted is lost");
+  }
   std::vector<NamedCount> counts;
   for (const auto& item : record.node()) {
     const auto name = item.first.as<std::string>();

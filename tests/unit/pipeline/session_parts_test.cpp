@@ -115,6 +115,14 @@ TEST(GpsPart, begins_its_counts_anew_and_says_so_where_they_are_damaged) {
   EXPECT_FALSE(exporter::read_counts(folder.file("gps_odometry.counts.yaml")).empty());
 }
 
+TEST(LogPart, begins_its_counts_anew_and_says_so_where_a_power_failure_emptied_them) {
+  const ScratchFolder folder;
+  write_all(folder.file("log.counts.yaml"), "");
+  const Events events = LogPart(folder.path(), exporter::Opening::kContinue).take_events();
+  ASSERT_EQ(events.size(), 1U);
+  EXPECT_THAT(events[0].text, HasSubstr("log.counts.yaml: empty"));
+}
+
 TEST(StoredDatum, that_is_damaged_counts_for_none_with_a_warning_where_a_program_must_start) {
   const ScratchFolder folder;
   Events events;

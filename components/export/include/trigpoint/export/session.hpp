@@ -247,7 +247,7 @@ class CountsWriter {
   std::vector<NamedCount> before_;
 };
 
-std::vector<NamedCount> read_counts(const std::string& file);
+std::vector<NamedCount> read_counts(const std::string& file);  ///< throws when damaged or empty
 
 /// The counts of each program under the names that the report knows.
 std::vector<NamedCount> counts_of(const GpsStatus& status);
