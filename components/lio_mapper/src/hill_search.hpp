@@ -62,10 +62,10 @@ class HillSearch {
   }
 
   /// Scatter, in the plane, of the places about this one that are as good.
-  Eigen::Matrix2d spread_about(const Pose& T_odom_level, std::size_t centre) const {
-    const auto points = turned(parts_.fine_level_m, T_odom_level.q);
-    const LikelihoodField& field = field_of(centre);
-    const double least = mean_likelihood(field, points, T_odom_level.p) - kAsGood;
+  Eigen::Matrix2d spread_about(const Hypothesis& top) const {
+    const auto points = turned(parts_.fine_level_m, from_yaw(top.yaw_rad));
+    const LikelihoodField& field = field_of(top.centre);
+    const double least = mean_likelihood(field, points, top.p_odom_m) - kAsGood;
     // Beyond that a place as good is a rival, unless the robot must be in the area.
     const double reach_m = area_.holds_robot ? area_.radius_m + kStep_m : kSame_m;
     const int steps = static_cast<int>(reach_m / kSpreadStep_m);
@@ -74,7 +74,7 @@ class HillSearch {
     for (int x = -steps; x <= steps; ++x) {
       for (int y = -steps; y <= steps; ++y) {
         const Eigen::Vector3d offset_m = kSpreadStep_m * Eigen::Vector3d(x, y, 0.0);
-        if (mean_likelihood(field, points, T_odom_level.p + offset_m) >= least) {
+        if (mean_likelihood(field, points, top.p_odom_m + offset_m) >= least) {
           sum += offset_m.head<2>() * offset_m.head<2>().transpose();
           ++count;  // the place itself at least
         }

@@ -75,6 +75,7 @@ Sighting LostTrack::search(ScanFilter& filter,
                   std::min(kMargin_rad + reach_rad(covariance), config_.yaw_rad)};
   area.holds_robot =
       area.radius_m < kSmall_m && kMargin_rad + reach_rad(covariance) <= config_.yaw_rad;
+  area.sigma_m = reach_m(covariance) / kSigmas;
   const RegistrationResult result =
       register_scan(scan, filter.map(), area, matching_, config_, filter.workers());
   obstacle_ = result.obstacle;

@@ -23,6 +23,7 @@ namespace {
 
 constexpr std::size_t kRefinedPoints = 3000;
 /// The matcher goes at most so far from the top of the hill: beyond it slid somewhere else.
+constexpr double kLeastSigma_m = 0.05;
 constexpr double kRefined_m = 0.5;
 constexpr double kRefined_rad = 0.05;
 constexpr std::int64_t kMaxIterations = 20;
@@ -117,6 +118,15 @@ std::string obstacle_to(const Registration& best,
   return "";
 }
 
+/// What the field leaves open the centre tells: both weighed by their covariances, in the plane.
+void weigh_with_centre(const SearchArea& area, Hypothesis& top, Eigen::Matrix2d& spread_m2) {
+  const double sigma_m = std::max(area.sigma_m, kLeastSigma_m);
+  const Eigen::Matrix2d of_centre_m2 = sigma_m * sigma_m * Eigen::Matrix2d::Identity();
+  const Eigen::Matrix2d gain = spread_m2 * (spread_m2 + of_centre_m2).inverse();
+  top.p_odom_m.head<2>() += gain * (area.centres_odom[top.centre].p - top.p_odom_m).head<2>();
+  spread_m2 = (gain * of_centre_m2).eval();
+}
+
 }  // namespace
 
 RegistrationResult register_scan(const LevelScan& scan,
@@ -138,8 +148,12 @@ RegistrationResult register_scan(const LevelScan& scan,
     return result;
   }
   HillSearch search(area, parts, map, workers);
-  const std::vector<Hypothesis> hills = search.hills();
-  const Hypothesis& top = hills.front();
+  std::vector<Hypothesis> hills = search.hills();
+  Hypothesis& top = hills.front();
+  Eigen::Matrix2d spread_m2 = search.spread_about(top);
+  if (area.holds_robot) {
+    weigh_with_centre(area, top, spread_m2);
+  }
   const auto T =
       refined(top, scan, thinned(scan.points_base, kRefinedPoints), map, matching, workers);
   if (!T) {
@@ -151,7 +165,7 @@ RegistrationResult register_scan(const LevelScan& scan,
   best.centre = area.centres_odom[top.centre];
   const Pose T_odom_level(T->q * scan.q_level_base.conjugate(), T->p);
   best.share = search.share_at(T_odom_level, top.centre);
-  best.spread_m2 = search.spread_about(T_odom_level, top.centre);
+  best.spread_m2 = spread_m2;
   best.runner_up_share = search.runner_up_share(top, hills);
   result.obstacle = obstacle_to(best, top, area, config);
   result.accepted = result.obstacle.empty();

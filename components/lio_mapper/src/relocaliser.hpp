@@ -34,6 +34,8 @@ struct SearchArea {
   /// The robot is known to be in the area: places as good in one piece are no rivals, the nearest
   /// to the centre is taken. Heights are the centres' own, not the ground's.
   bool holds_robot{false};
+  /// Then, how uncertain the robot is about its centre, in the plane.
+  double sigma_m{0.0};
 };
 
 struct Registration {

@@ -288,8 +288,8 @@ std::optional<Resumption::Found> Resumption::attempt_at_once(const Pose& T_base_
   const Pose T_first_newest = start.initial.state.T_odom_base.inverse() * gathered.T_new_base;
   const double turned_rad = away_s * turn_radps;
   SearchArea area{{predicted_place(away_s, 0.5 * turned_rad, T_first_newest)}};
-  area.radius_m =
-      kAtOnce_m + kSigmas * away_s * (kVelocitySigma_mps + 0.5 * kAcceleration_mps2 * away_s);
+  area.sigma_m = away_s * (kVelocitySigma_mps + 0.5 * kAcceleration_mps2 * away_s);
+  area.radius_m = kAtOnce_m + kSigmas * area.sigma_m;
   area.yaw_rad = 0.5 * std::abs(turned_rad) + kTurnedBeyond_rad;
   area.holds_robot = true;
   return look_in({area}, start, scan, gathered.T_new_base);
