@@ -109,11 +109,11 @@ class HillSearch {
   /// for.
   static constexpr double kHeightReach_m = 0.6;
   static constexpr double kHeightStep_m = 0.1;
-  static constexpr double kSameHeight_m = 0.25;  // as the field's sigma
+  static constexpr double kSameHeight_m = LikelihoodField::kSigma_m;
   /// Heights count by this power of their share: cells are as high as the field's sigma nearly, so
   /// that the middle of the best ones is meant.
   static constexpr double kHeightPower = 20.0;
-  static constexpr double kGroundRadius_m = 12.0;
+  static constexpr double kGroundRadius_m = ScanParts::kGroundRadius_m;
   /// The ground below a robot may be hidden from it, but not all around.
   static constexpr double kGroundBeside_m = 2.0;
   static constexpr double kSomething = 0.05;  // likelihood of a point that has any other near
@@ -241,7 +241,11 @@ class HillSearch {
   /// be a bridge, or a floor below.
   std::vector<Eigen::Vector3d> places_about(std::size_t centre) const {
     const Pose& T = area_.centres_odom[centre];
-    const GroundGrid ground = ground_of(map_points_, T, area_.radius_m);
+    const bool on_ground_too = !area_.holds_robot && parts_.ground_m;
+    std::optional<GroundGrid> ground;
+    if (on_ground_too) {
+      ground = ground_of(map_points_, T, area_.radius_m);
+    }
     const int steps = static_cast<int>(std::ceil(area_.radius_m / kStep_m));
     std::vector<Eigen::Vector3d> places;
     for (int x = -steps; x <= steps; ++x) {
@@ -254,8 +258,9 @@ class HillSearch {
         if (has_ground_at(place_m, centre)) {
           places.push_back(place_m);
         }
-        const std::optional<double> height = ground.height_at(place_m.head<2>(), kGroundRadius_m);
-        if (!area_.holds_robot && height && parts_.ground_m) {
+        const std::optional<double> height =
+            on_ground_too ? ground->height_at(place_m.head<2>(), kGroundRadius_m) : std::nullopt;
+        if (height) {
           const double z = *height - *parts_.ground_m;
           if (std::abs(z - place_m.z()) > kSameHeight_m || places.size() == before) {
             places.emplace_back(place_m.x(), place_m.y(), z);

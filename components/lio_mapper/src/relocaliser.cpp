@@ -22,8 +22,8 @@ using Eigen::Vector3d;
 namespace {
 
 constexpr std::size_t kRefinedPoints = 3000;
+constexpr double kLeastSigma_m = 0.05;  // of an area's centre
 /// The matcher goes at most so far from the top of the hill: beyond it slid somewhere else.
-constexpr double kLeastSigma_m = 0.05;
 constexpr double kRefined_m = 0.5;
 constexpr double kRefined_rad = 0.05;
 constexpr std::int64_t kMaxIterations = 20;

@@ -14,7 +14,7 @@ using Eigen::Vector3d;
 
 namespace {
 
-constexpr double kGroundRadius_m = 12.0;
+constexpr double kGroundRadius_m = ScanParts::kGroundRadius_m;
 constexpr double kStandsOut_m = 0.5;  // above the ground
 constexpr double kOnGround_m = 0.3;   // from it
 constexpr std::size_t kFewestOnGround = 50;

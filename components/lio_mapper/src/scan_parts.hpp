@@ -32,6 +32,8 @@ struct ScanParts {
   /// So far they are taken where too few are near.
   static constexpr double kFar_m = 50.0;
   static constexpr std::size_t kFewest = 80;
+  /// What is the ground is judged so far around a place.
+  static constexpr double kGroundRadius_m = 12.0;
 
   /// Height of the ground below base, negative; nothing where no ground is seen, and then
   /// everything stands out.
