@@ -140,12 +140,14 @@ Loop::Task Loop::next_task(std::unique_lock<std::mutex>& lock) {
       room_.notify_one();
       return task;
     }
+    waiting_ = true;
     if (timer == timers_.end()) {
       work_.wait(lock);
     } else {
       const Clock::time_point due = timer->second.due;
       work_.wait_until(lock, due);
     }
+    waiting_ = false;
   }
   return {};
 }
@@ -185,6 +187,11 @@ void Loop::stop() {
 bool Loop::stopped() const {
   const std::lock_guard lock(mutex_);
   return stopped_;
+}
+
+bool Loop::is_waiting() const {
+  const std::lock_guard lock(mutex_);
+  return waiting_ && tasks_.empty();
 }
 
 std::uint64_t Loop::dropped() const {

@@ -18,9 +18,13 @@
 
 namespace trigpoint::lio_mapper {
 
+/// What the mapper does when a cloud comes.
+enum class MapperIs : std::uint8_t { kWaiting, kBusy };
+
 /// Decodes clouds, in the order in which they came, on a thread of its own while the mapper matches
 /// the ones before. A mapper that waits for a cloud decodes it itself: nothing is handed from
-/// thread to thread then, and the points are in its processor's cache.
+/// thread to thread then, no third thread is woken beside the two that have work, and the points
+/// are in the mapper's processor's cache.
 class DecodeAhead {
  public:
   /// So many decoded clouds may wait for the mapper; then add() waits.
@@ -35,15 +39,17 @@ class DecodeAhead {
   DecodeAhead(const DecodeAhead&) = delete;
   DecodeAhead& operator=(const DecodeAhead&) = delete;
 
-  /// False when it was stopped.
-  bool add(PointCloudMessage cloud) {
+  /// False when it was stopped. What a waiting mapper is given, it decodes, unless it is busy again
+  /// when the next one comes.
+  bool add(PointCloudMessage cloud, MapperIs mapper) {
     std::unique_lock lock(mutex_);
     room_.wait(lock, [this] { return stopped_ || raw_.size() < kRaw; });
     if (stopped_) {
       return false;
     }
-    raw_.push_back({std::move(cloud), Clock::now() + kLeftToTheMapper});
-    work_.notify_one();
+    raw_.push_back(std::move(cloud));
+    called_ = called_ || mapper == MapperIs::kBusy;
+    wake_if_called();
     return true;
   }
 
@@ -54,7 +60,7 @@ class DecodeAhead {
       if (!decoded_.empty()) {
         std::optional<DecodedCloud> oldest(std::move(decoded_.front()));
         decoded_.pop_front();
-        work_.notify_one();
+        wake_if_called();
         return oldest;
       }
       if (stopped_) {
@@ -90,23 +96,14 @@ class DecodeAhead {
   using Clock = std::chrono::steady_clock;
 
   static constexpr std::size_t kRaw = 2;  ///< beside the one in work
-  /// A mapper that has not come for it by then is busy with a scan.
-  static constexpr std::chrono::milliseconds kLeftToTheMapper{2};
   /// Who sends larger clouds, or one such, does not make us keep its memory.
   static constexpr std::size_t kMostSpare_bytes = 16'000'000;
-
-  struct Raw {
-    PointCloudMessage cloud;
-    Clock::time_point due;
-  };
 
   void work() {
     std::unique_lock lock(mutex_);
     while (!stopped_) {
-      if (decoding_ || raw_.empty() || decoded_.size() >= most_) {
+      if (!called_ || decoding_ || raw_.empty() || decoded_.size() >= most_) {
         work_.wait(lock);
-      } else if (const Clock::time_point due = raw_.front().due; Clock::now() < due) {
-        work_.wait_until(lock, due);
       } else {
         decode_front(lock);
       }
@@ -116,8 +113,9 @@ class DecodeAhead {
   /// By one thread at a time, so that clouds stay in order.
   void decode_front(std::unique_lock<std::mutex>& lock) {
     decoding_ = true;
-    PointCloudMessage cloud = std::move(raw_.front().cloud);
+    PointCloudMessage cloud = std::move(raw_.front());
     raw_.pop_front();
+    called_ = called_ && !raw_.empty();
     lock.unlock();
     room_.notify_one();
     const Clock::time_point before = Clock::now();
@@ -131,7 +129,14 @@ class DecodeAhead {
       spare_ = std::move(cloud.data);
     }
     ready_.notify_one();
-    work_.notify_one();
+    wake_if_called();
+  }
+
+  /// With mutex_ held.
+  void wake_if_called() {
+    if (called_) {
+      work_.notify_one();
+    }
   }
 
   CloudDecoder decoder_;
@@ -140,10 +145,11 @@ class DecodeAhead {
   std::condition_variable work_;   ///< for the thread
   std::condition_variable room_;   ///< for add()
   std::condition_variable ready_;  ///< for take()
-  std::deque<Raw> raw_;
+  std::deque<PointCloudMessage> raw_;
   std::deque<DecodedCloud> decoded_;
   std::vector<std::uint8_t> spare_;
   bool decoding_{false};
+  bool called_{false};  ///< the thread, for what is raw
   bool stopped_{false};
   std::thread thread_;  ///< last: it uses the others
 };

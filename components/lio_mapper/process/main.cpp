@@ -122,7 +122,9 @@ class Process {
     points_.emplace(participant_,
                     topics::points.renamed(settings.robot.points_topic),
                     [this, &loop](sensor_msgs::msg::PointCloud2& m, const bus::MessageInfo&) {
-                      if (decoding_.add(bus::from_message(std::move(m)))) {
+                      const auto mapper = loop.is_waiting() ? lio_mapper::MapperIs::kWaiting
+                                                            : lio_mapper::MapperIs::kBusy;
+                      if (decoding_.add(bus::from_message(std::move(m)), mapper)) {
                         loop.post([this] { take_cloud(); });
                       }
                       m.data(decoding_.take_spare_bytes());

@@ -93,6 +93,27 @@ TEST(Loop, does_not_block_its_own_thread) {
   EXPECT_EQ(loop.run(), 0);
 }
 
+TEST(Loop, waits_between_tasks_and_only_then) {
+  Loop loop;
+  EXPECT_FALSE(loop.is_waiting());  // it does not run yet
+  bool waits_in_a_task = true;
+  std::thread poster([&] {
+    const auto until_it_waits = [&] {
+      while (!loop.is_waiting()) {
+        std::this_thread::yield();
+      }
+    };
+    until_it_waits();
+    loop.post([&] { waits_in_a_task = loop.is_waiting(); });
+    until_it_waits();
+    loop.stop();
+  });
+  loop.run();
+  poster.join();
+  EXPECT_FALSE(waits_in_a_task);
+  EXPECT_FALSE(loop.is_waiting());
+}
+
 TEST(Loop, fires_a_timer_again_and_again_and_not_early) {
   Loop loop;
   int fired = 0;

@@ -14,6 +14,7 @@
 #include <functional>
 #include <future>
 #include <thread>
+#include <tuple>
 #include <variant>
 #include <vector>
 
@@ -77,7 +78,7 @@ Said on_one_thread() {
 }
 
 /// As process/main.cpp does it, with a bounded queue for its loop.
-void on_threads(std::size_t most, Said& said) {
+void on_threads(std::size_t most, MapperIs mapper_is, Said& said) {
   LioMapper mapper({}, RobotConfig{});
   DecodeAhead decoding({}, most);
   BoundedQueue<std::function<void()>> loop(1000);
@@ -85,7 +86,7 @@ void on_threads(std::size_t most, Said& said) {
     for (const Input& input : inputs()) {
       if (const auto* imu = std::get_if<ImuSample>(&input)) {
         loop.push([&said, &mapper, imu] { said.take(mapper.on_imu(*imu)); });
-      } else if (decoding.add(std::get<PointCloudMessage>(input))) {
+      } else if (decoding.add(std::get<PointCloudMessage>(input), mapper_is)) {
         loop.push([&] { said.take(mapper.on_decoded_cloud(std::move(*decoding.take()))); });
       }
     }
@@ -113,24 +114,37 @@ void expect_same(const Said& a, const Said& b) {
   }
 }
 
-class DecodingAhead : public ::testing::TestWithParam<std::size_t> {};
+class DecodingAhead : public ::testing::TestWithParam<std::tuple<std::size_t, MapperIs>> {};
 
 TEST_P(DecodingAhead, gives_the_same_bits_events_and_counts_as_one_thread) {
   const Said expected = on_one_thread();
   ASSERT_GE(expected.scans.size(), 25U);
   ASSERT_FALSE(expected.events.empty());
   Said threaded;
-  on_threads(GetParam(), threaded);
+  on_threads(std::get<0>(GetParam()), std::get<1>(GetParam()), threaded);
   expect_same(expected, threaded);
 }
 
-INSTANTIATE_TEST_SUITE_P(ByRoom, DecodingAhead, ::testing::Values(1, 4, 60));
+INSTANTIATE_TEST_SUITE_P(ByRoom,
+                         DecodingAhead,
+                         ::testing::Combine(::testing::Values(1, 4, 60),
+                                            ::testing::Values(MapperIs::kWaiting,
+                                                              MapperIs::kBusy)));
+
+TEST(DecodeAheadThread, leaves_a_cloud_to_a_mapper_that_waits) {
+  DecodeAhead decoding({}, 1);
+  ASSERT_TRUE(decoding.add(RoomDrive().sweep_at(RoomDrive::kEpoch_ns, 10), MapperIs::kWaiting));
+  std::this_thread::sleep_for(std::chrono::milliseconds(30));  // many times what decoding takes
+  EXPECT_EQ(decoding.take_spare_bytes().capacity(), 0U);
+  EXPECT_TRUE(decoding.take().has_value());
+  EXPECT_GT(decoding.take_spare_bytes().capacity(), 0U);
+}
 
 TEST(DecodeAheadThread, lets_go_of_who_waits_to_hand_a_cloud_over_when_it_is_stopped) {
   DecodeAhead decoding({}, 1);
   const PointCloudMessage cloud = RoomDrive().sweep_at(RoomDrive::kEpoch_ns, 10);
   auto waiting = std::async(std::launch::async, [&] {
-    while (decoding.add(cloud)) {
+    while (decoding.add(cloud, MapperIs::kBusy)) {
     }
   });
   decoding.stop();
@@ -140,7 +154,7 @@ TEST(DecodeAheadThread, lets_go_of_who_waits_to_hand_a_cloud_over_when_it_is_sto
 TEST(DecodeAheadThread, decodes_by_itself_while_the_mapper_is_busy) {
   DecodeAhead decoding({}, 1);
   PointCloudMessage cloud = RoomDrive().sweep_at(RoomDrive::kEpoch_ns, 10);
-  ASSERT_TRUE(decoding.add(cloud));
+  ASSERT_TRUE(decoding.add(cloud, MapperIs::kBusy));
   std::vector<std::uint8_t> spare;  // there once it is decoded, and nobody has asked for it
   while ((spare = decoding.take_spare_bytes()).capacity() == 0) {
     std::this_thread::yield();
@@ -155,7 +169,7 @@ TEST(DecodeAheadThread, gives_the_memory_of_a_decoded_cloud_back_unless_it_is_la
     PointCloudMessage given = cloud;
     given.data.reserve(bytes);
     const std::uint8_t* memory = given.data.data();
-    ASSERT_TRUE(decoding.add(std::move(given)));
+    ASSERT_TRUE(decoding.add(std::move(given), MapperIs::kWaiting));
     ASSERT_TRUE(decoding.take().has_value());
     const std::vector<std::uint8_t> spare = decoding.take_spare_bytes();
     EXPECT_EQ(spare.data() == memory, bytes < 16'000'000U);
@@ -202,7 +216,7 @@ TEST(WritingBeside, a_disk_that_does_not_answer_delays_no_scan_and_loses_none) {
       written.push_back(stamp_ns);
     });
   };
-  on_threads(60, said);  // returns although nothing is written yet
+  on_threads(60, MapperIs::kBusy, said);  // returns although nothing is written yet
   answer.set_value();
   disk.finish();
   expect_same(on_one_thread(), said);

@@ -51,6 +51,8 @@ class Loop {
   void stop();
 
   bool stopped() const;
+  /// Nothing to do at this moment: what is posted now, it runs at once.
+  bool is_waiting() const;
   std::uint64_t dropped() const;
   std::size_t queued() const;
 
@@ -83,6 +85,7 @@ class Loop {
   TimerId last_timer_{0};
   std::uint64_t dropped_{0};
   bool stopped_{false};
+  bool waiting_{false};
   int signal_{0};
   std::thread::id runner_;
   int signal_fd_{-1};
