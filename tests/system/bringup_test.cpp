@@ -57,6 +57,7 @@ TEST(Bringup, run_finds_wrong_usage_before_it_makes_a_session) {
                  {{{"short", "--rate", "abc"}, "--rate must be 'max' or a number above 0"},
                   {{"short", "--rate", "nan"}, "--rate must be"},
                   {{"short", "--rate", "--seed", "1"}, "--rate needs a value"},
+                  {{"short", "--mode", "soft"}, "--mode: 'soft' is neither smooth"},
                   {{"short", "--seed", "1.5"}, "must be a whole number"},
                   {{"short", "--duration", "abc"}, "must be a number above 0"},
                   {{"short", "--config", no_interface}, "network_interface is 'nope0'"},
