@@ -12,6 +12,7 @@ namespace trigpoint::fusion_gate {
 namespace {
 
 constexpr Nanoseconds kLioBuffer_ns = 10 * kNanosecondsPerSecond;
+constexpr Nanoseconds kGpsBuffer_ns = 5 * kNanosecondsPerSecond;  // a takeover looks back so far
 
 }  // namespace
 
@@ -28,7 +29,8 @@ FusionGate::Impl::Impl(const Config& config_in, const RobotConfig& robot_in)
       monitor(config_in, robot_in.antenna_position_base_m),
       placements(config_in),
       hand_over(config_in.smooth.hand_over_mps, config_in.smooth.hand_over_radps),
-      receiver(config_in) {}
+      receiver(config_in),
+      gps_poses(kGpsBuffer_ns, from_seconds(config_in.alignment.max_interpolation_gap_s)) {}
 
 FusionGate::FusionGate(const Config& config, const RobotConfig& robot)
     : impl_(std::make_unique<Impl>(config, robot)) {}
@@ -89,6 +91,7 @@ Output FusionGate::on_datum(const Datum& datum) {
   impl_->window.clear();
   impl_->monitor.begin_anew();
   impl_->raw_fixes.clear();
+  impl_->gps_poses_writer.clear();  // begun anew
   impl_->receiver.forget_way();
   for (auto& [writer, source] : impl_->foreign_sources) {
     source.forget_alignment();

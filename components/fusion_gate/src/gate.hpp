@@ -113,6 +113,11 @@ struct FusionGate::Impl {
   Pose without_step(const Odometry& odometry);
   void keep_motion(bool goes_on);
   Pose as_predicted(Nanoseconds stamp_ns, const Pose& otherwise) const;
+  void remember_gps(const Odometry& gps_in_map);
+  bool gps_dead_reckons() const;
+  Eigen::Vector3d gps_velocity_error_mps() const;
+  std::optional<Pose> as_gps_moved(const Odometry& base) const;
+  Pose taken_over_by_gps(const Odometry& base);
 
   // --- status
   FusionStatus status() const;
@@ -183,6 +188,9 @@ struct FusionGate::Impl {
   std::deque<Odometry> recent_odom;  // the same as LIO tells it
   std::optional<Carrier> last_carrier;
   std::string last_gps_writer;  // of the GPS odometry that carried
+  PoseBuffer gps_poses;         // base_link in map by the followed GPS filter
+  std::string gps_poses_writer;
+  Eigen::Vector3d gps_error_map_mps{Eigen::Vector3d::Zero()};  // of its velocity, when it took over
   std::uint32_t last_epoch{0};
   std::optional<Odometry> last_odom;
   std::optional<Nanoseconds> odom_jumped_at_status_ns;

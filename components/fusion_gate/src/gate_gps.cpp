@@ -75,6 +75,9 @@ void FusionGate::Impl::take_gps_odometry(const Odometry& odometry,
     return;
   }
   out.selected = gps_in_map();
+  if (out.selected) {
+    remember_gps(*out.selected);
+  }
   if (out.selected && sources.find(writer)->status && !aligned()) {
     hear_heading_of(*out.selected);
   }

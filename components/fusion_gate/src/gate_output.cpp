@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace trigpoint::fusion_gate {
 
@@ -21,6 +22,9 @@ constexpr double kGpsStep_m = 0.5;  // a GPS filter was set anew: more than corr
 /// speed over half of what they tell of.
 constexpr double kLioStep_m = 0.02;
 constexpr double kLioChange_mps = 1.0;
+
+/// What a robot does to its velocity, so that more is none of its motion.
+constexpr double kHardestChange_mps2 = 3.0;
 
 constexpr double kMotion_s = 0.5;       // over which the robot's motion is seen
 constexpr double kLeastMotion_s = 0.1;  // for less, the twist
@@ -169,10 +173,84 @@ void FusionGate::Impl::publish_gps(Output& out) {
   const bool steps = (predicted.p - base.T_frame_child.p).norm() > kGpsStep_m;
   const bool same_filter = last_gps_writer == sources.followed();
   const bool goes_on = last_carrier == Carrier::kGps && same_filter && !steps;
+  Pose unchanged = predicted;
+  if (goes_on) {
+    unchanged = base.T_frame_child;
+    if (gps_dead_reckons()) {
+      unchanged.p -= to_seconds(base.stamp_ns - last_raw->stamp_ns) * gps_error_map_mps;
+    }
+  } else if (last_carrier == Carrier::kLio) {
+    unchanged = taken_over_by_gps(base);
+  } else {
+    gps_error_map_mps.setZero();
+  }
   keep_motion(goes_on);
   last_carrier = Carrier::kGps;
   last_gps_writer = sources.followed();
-  publish(base, goes_on ? base.T_frame_child : predicted, out);
+  publish(base, unchanged, out);
+}
+
+void FusionGate::Impl::remember_gps(const Odometry& gps_in_map) {
+  if (gps_poses_writer != sources.followed()) {
+    gps_poses_writer = sources.followed();
+    gps_poses.forget_before(std::numeric_limits<Nanoseconds>::max());
+  }
+  const Odometry base = move_to_base(gps_in_map, robot.antenna_position_base_m);
+  gps_poses.add(base.stamp_ns, base.T_frame_child, base.pose_covariance);
+}
+
+/// No fix holds the GPS filter's velocity.
+bool FusionGate::Impl::gps_dead_reckons() const {
+  const GpsSource* source = sources.followed_source();
+  return source != nullptr && source->status && source->status->health != GpsHealth::kOk &&
+         source->status->health != GpsHealth::kDegraded;
+}
+
+/// Of a GPS filter that dead-reckons: by how much faster it went, in map, than what was published
+/// until then. Over the next seconds its velocity is off by as much.
+Eigen::Vector3d FusionGate::Impl::gps_velocity_error_mps() const {
+  const double known_s = recent_raw.empty()
+                             ? 0.0
+                             : to_seconds(recent_raw.back().stamp_ns - recent_raw.front().stamp_ns);
+  if (known_s < kLeastMotion_s || !gps_dead_reckons()) {
+    return Eigen::Vector3d::Zero();
+  }
+  const PoseBuffer::Answer from = gps_poses.at(recent_raw.front().stamp_ns);
+  const PoseBuffer::Answer to = gps_poses.at(recent_raw.back().stamp_ns);
+  if (from.coverage != PoseBuffer::Coverage::kCovered ||
+      to.coverage != PoseBuffer::Coverage::kCovered) {
+    return Eigen::Vector3d::Zero();
+  }
+  const Pose& last = recent_raw.back().T_frame_child;
+  const Eigen::Quaterniond R_map_gps = last.q * to.sample.T_frame_child.q.conjugate();
+  const Eigen::Vector3d gps_moved_m = to.sample.T_frame_child.p - from.sample.T_frame_child.p;
+  return (R_map_gps * gps_moved_m - (last.p - recent_raw.front().T_frame_child.p)) / known_s;
+}
+
+/// From the last raw pose as the GPS filter has moved since: through turns and stops that nobody
+/// foresees. nullopt where it was not heard then, knows no heading, or moved as no robot does.
+std::optional<Pose> FusionGate::Impl::as_gps_moved(const Odometry& base) const {
+  if (!last_raw || !knows_heading(base)) {
+    return std::nullopt;
+  }
+  const PoseBuffer::Answer before = gps_poses.at(last_raw->stamp_ns);
+  if (before.coverage != PoseBuffer::Coverage::kCovered) {
+    return std::nullopt;
+  }
+  const double dt_s = to_seconds(base.stamp_ns - last_raw->stamp_ns);
+  const Pose& last = last_raw->T_frame_child;
+  const Eigen::Quaterniond R_map_gps = last.q * before.sample.T_frame_child.q.conjugate();
+  const Eigen::Vector3d gps_moved_m = base.T_frame_child.p - before.sample.T_frame_child.p;
+  const Pose moved{(R_map_gps * base.T_frame_child.q).normalized(),
+                   last.p + R_map_gps * gps_moved_m - dt_s * gps_error_map_mps};
+  const double beside_m = (moved.p - as_predicted(base.stamp_ns, moved).p).norm();
+  return beside_m <= kGpsStep_m + 0.5 * kHardestChange_mps2 * dt_s * dt_s ? std::optional(moved)
+                                                                          : std::nullopt;
+}
+
+Pose FusionGate::Impl::taken_over_by_gps(const Odometry& base) {
+  gps_error_map_mps = gps_velocity_error_mps();
+  return as_gps_moved(base).value_or(as_predicted(base.stamp_ns, base.T_frame_child));
 }
 
 /// LIO finds the robot elsewhere than it went when surfaces come into sight along an axis where
@@ -219,7 +297,10 @@ void FusionGate::Impl::publish(const Odometry& odometry, const Pose& unchanged, 
   last_raw = odometry;
   keep(odometry, recent_raw);
   out.fused_raw = odometry;
-  out.fused = mode == Mode::kSmooth ? hand_over.follow(odometry, unchanged) : odometry;
+  // Who dead-reckons knows the robot's place worse than those who carried before it.
+  const bool stays = last_carrier == Carrier::kGps && gps_dead_reckons();
+  const auto offset = stays ? HandOver::Offset::kStays : HandOver::Offset::kShrinks;
+  out.fused = mode == Mode::kSmooth ? hand_over.follow(odometry, unchanged, offset) : odometry;
 }
 
 std::optional<std::string> FusionGate::Impl::missing_fix() const {

@@ -73,6 +73,16 @@ TEST(HandOver, keeps_the_robots_place_when_the_estimate_turns_about_it) {
   EXPECT_NEAR((published.T_frame_child.p - before.p).norm(), 0.0, kExact);
 }
 
+TEST(HandOver, keeps_what_an_estimate_that_is_no_better_differs_by) {
+  HandOver hand_over(kRate_mps, kRate_radps);
+  const Pose before{from_yaw(0.0), {0.0, 0.0, 0.0}};
+  const Pose after{from_yaw(0.0), {1.0, 0.0, 0.0}};
+  hand_over.follow(at(0.0, before), before);
+  const Odometry published = hand_over.follow(at(0.1, after), before, HandOver::Offset::kStays);
+  EXPECT_NEAR(published.T_frame_child.p.x(), 0.0, kExact);
+  EXPECT_NEAR(published.pose_covariance(0, 0), 1e-4 + 1.0, kExact);
+}
+
 Scenario smooth_drive(bool with_imu_rate) {
   Scenario scenario;
   scenario.config = Config{};
@@ -118,6 +128,79 @@ TEST_P(LioOf, is_followed_at_the_rate_where_it_finds_the_robot_elsewhere) {
         << after[i].first;
   }
   EXPECT_NEAR(after.back().second.norm(), kFound_m, 0.01);
+}
+
+// ---- the mapper falls silent in motion, and GPS carries after lio_timeout_s
+// ----------------------
+
+constexpr double kSilent_s = 20.0;
+
+double worst(const SimulatedDrive& drive, double from_s) {
+  double worst_m = 0.0;
+  for (const auto& [at_s, error_m] : errors(drive, from_s)) {
+    worst_m = std::max(worst_m, error_m.norm());
+  }
+  return worst_m;
+}
+
+/// 4 m/s, and from `from_s` on a bend of 8 m while it brakes by 2 m/s^2.
+Pose braking_in_a_bend(double from_s, double now_s) {
+  constexpr double kSpeed_mps = 4.0;
+  constexpr double kBrakes_mps2 = 2.0;
+  constexpr double kRadius_m = 8.0;
+  const double braked_s = std::clamp(now_s - from_s, 0.0, kSpeed_mps / kBrakes_mps2);
+  const double bend_m = kSpeed_mps * braked_s - 0.5 * kBrakes_mps2 * braked_s * braked_s;
+  const double turned_rad = bend_m / kRadius_m;
+  return {from_yaw(turned_rad),
+          {kSpeed_mps * std::min(now_s, from_s) + kRadius_m * std::sin(turned_rad),
+           kRadius_m * (1.0 - std::cos(turned_rad)),
+           0.0}};
+}
+
+Scenario drive_with_headings() {
+  Scenario scenario = smooth_drive(false);
+  scenario.gps_yaw_sigma_rad = 0.02;
+  scenario.gps_odometry_hz = 100.0;
+  return scenario;
+}
+
+TEST(GateWithoutMapper, goes_as_the_gps_filter_saw_the_robot_go_meanwhile) {
+  SimulatedDrive drive{drive_with_headings()};
+  drive.route = [](double now_s) { return braking_in_a_bend(kSilent_s, now_s); };
+  drive.run_until(kSilent_s);
+  drive.lio_alive = false;
+  drive.run_until(kSilent_s + 3.0);
+  ASSERT_GT(errors(drive, kSilent_s + 1.0).size(), 150U);
+  EXPECT_LT(worst(drive, kSilent_s - 1.0), 0.01);
+}
+
+TEST(GateWithoutMapper, follows_a_filter_that_dead_reckons_in_its_motion_only) {
+  Scenario scenario = drive_with_headings();
+  scenario.reception = {{10.0}, {1e9, 5.0, false, GpsHealth::kDeadReckoning}};
+  SimulatedDrive drive{scenario};
+  drive.gps_error_m = [](double now_s) {  // 4 m off by then, and 0.5 m/s too fast
+    return Eigen::Vector3d(0.5 * std::max(0.0, now_s - 12.0), 0.0, 0.0);
+  };
+  drive.run_until(kSilent_s);
+  drive.lio_alive = false;
+  drive.run_until(kSilent_s + 2.5);
+  ASSERT_GT(errors(drive, kSilent_s + 1.0).size(), 100U);
+  drive.lio_alive = true;
+  drive.run_until(kSilent_s + 5.0);
+  EXPECT_LT(worst(drive, kSilent_s - 1.0), 0.02);
+}
+
+TEST(GateWithoutMapper, does_not_take_a_jump_of_the_filter_for_motion) {
+  constexpr double kJump_m = 6.0;
+  SimulatedDrive drive{drive_with_headings()};
+  drive.gps_error_m = [](double now_s) {
+    return Eigen::Vector3d(now_s > kSilent_s + 0.5 ? kJump_m : 0.0, 0.0, 0.0);
+  };
+  drive.run_until(kSilent_s);
+  drive.lio_alive = false;
+  drive.run_until(kSilent_s + 1.2);
+  ASSERT_GT(errors(drive, kSilent_s + 1.0).size(), 10U);
+  EXPECT_LT(worst(drive, kSilent_s - 1.0), 0.5);
 }
 
 INSTANTIATE_TEST_SUITE_P(Gate, LioOf, testing::Values(true, false), [](const auto& each) {

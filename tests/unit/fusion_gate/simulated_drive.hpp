@@ -110,6 +110,9 @@ class SimulatedDrive {
   }
 
   Pose T_map_base(double now_s) const {
+    if (route) {
+      return route(now_s);
+    }
     const double heading_rad = 0.3 + 0.05 * now_s;
     const double radius_m = scenario_.speed_mps / 0.05;
     const Eigen::Vector3d p(
@@ -196,6 +199,8 @@ class SimulatedDrive {
   Nanoseconds stamp(double now_s) const { return from_seconds(start_s_ + now_s); }
 
   Eigen::Vector3d lio_found_elsewhere_m{Eigen::Vector3d::Zero()};  ///< from now on
+  std::function<Pose(double)> route;                               ///< in place of the circle
+  std::function<Eigen::Vector3d(double)> gps_error_m;              ///< of gps/odometry
   bool lio_alive{true};
   bool gps_alive{true};
   std::uint32_t epoch{7};
@@ -233,6 +238,9 @@ class SimulatedDrive {
     odometry.frame_id = "map";
     odometry.child_frame_id = "base_link";
     odometry.T_frame_child = T_map_base(now_s);
+    if (gps_error_m) {
+      odometry.T_frame_child.p += gps_error_m(now_s);
+    }
     const double sigma_m = reception_at(now_s).sigma_m;
     odometry.pose_covariance.topLeftCorner<3, 3>() =
         Eigen::Matrix3d::Identity() * sigma_m * sigma_m;

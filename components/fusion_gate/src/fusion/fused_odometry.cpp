@@ -48,6 +48,10 @@ Odometry fuse(const Odometry& odometry,
   return fuse(odometry, T_map_odom, with_tilt);
 }
 
+bool knows_heading(const Odometry& odometry) {
+  return odometry.pose_covariance(5, 5) < kUsableYawVariance_rad2;
+}
+
 Odometry move_to_base(const Odometry& gps, const Eigen::Vector3d& antenna_position_base_m) {
   Odometry base = gps;
   base.frame_id = "map";
@@ -55,7 +59,7 @@ Odometry move_to_base(const Odometry& gps, const Eigen::Vector3d& antenna_positi
   if (gps.child_frame_id != kAntennaFrame) {
     return base;
   }
-  if (!(gps.pose_covariance(5, 5) < kUsableYawVariance_rad2)) {
+  if (!knows_heading(gps)) {
     base.pose_covariance.topLeftCorner<3, 3>() +=
         antenna_position_base_m.squaredNorm() * Eigen::Matrix3d::Identity();
     return base;

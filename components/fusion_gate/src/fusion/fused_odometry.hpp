@@ -23,6 +23,9 @@ Odometry fuse(const Odometry& odometry,
 /// known, the antenna's position is kept and the lever arm's length joins the covariance.
 Odometry move_to_base(const Odometry& gps, const Eigen::Vector3d& antenna_position_base_m);
 
+/// Whether its orientation tells where its child frame heads.
+bool knows_heading(const Odometry& odometry);
+
 inline constexpr const char* kAntennaFrame = "gnss_antenna";
 
 }  // namespace trigpoint::fusion_gate

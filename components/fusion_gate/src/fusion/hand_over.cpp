@@ -8,11 +8,13 @@
 
 namespace trigpoint::fusion_gate {
 
-Odometry HandOver::follow(const Odometry& raw, const Pose& unchanged) {
+Odometry HandOver::follow(const Odometry& raw, const Pose& unchanged, Offset offset) {
   if (last_ns_) {
     offset_map_m_ += unchanged.p - raw.T_frame_child.p;
     turn_ = (turn_ * unchanged.q * raw.T_frame_child.q.conjugate()).normalized();
-    shrink(to_seconds(raw.stamp_ns - *last_ns_));
+    if (offset == Offset::kShrinks) {
+      shrink(to_seconds(raw.stamp_ns - *last_ns_));
+    }
   }
   last_ns_ = raw.stamp_ns;
   Odometry published = raw;

@@ -14,10 +14,14 @@ class HandOver {
  public:
   HandOver(double rate_mps, double rate_radps) : rate_mps_(rate_mps), rate_radps_(rate_radps) {}
 
+  /// What becomes of the changes: an estimate that is no better than what was published before is
+  /// followed in its motion only.
+  enum class Offset { kShrinks, kStays };
+
   /// The pose to publish for the estimate `raw`. `unchanged` is what the estimate would be at the
   /// same moment had nothing changed since the last call. What is left of the changes joins the
   /// covariance.
-  Odometry follow(const Odometry& raw, const Pose& unchanged);
+  Odometry follow(const Odometry& raw, const Pose& unchanged, Offset offset = Offset::kShrinks);
 
   /// Published less raw position.
   const Eigen::Vector3d& remaining_m() const { return offset_map_m_; }
