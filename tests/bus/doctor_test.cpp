@@ -2,14 +2,17 @@
 // Copyright the Trigpoint developers
 // `trigpoint doctor` on a live bus on which much is wrong, and on one on which nothing is.
 #include "trigpoint/bus/bus.hpp"
+#include "trigpoint/bus/cdr.hpp"
 #include "trigpoint/bus/convert.hpp"
 #include "trigpoint/bus/topics.hpp"
 
 #include "bus_fixture.hpp"
+#include "bus_survey.hpp"
 #include "wait_until.hpp"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <thread>
@@ -139,6 +142,47 @@ TEST(Doctor, finds_nothing_wrong_where_nothing_is) {
               AllOf(HasSubstr("writes datum, gps/fix, imu/data"),
                     Not(HasSubstr("! imu")),
                     Not(HasSubstr("trigpoint (process"))));
+}
+
+/// The rate is the sensor's, not that of a window in which nobody was heard for half of the time.
+TEST(BusSurvey, measures_the_rate_since_the_first_message) {
+  constexpr double kSurvey_s = 5.0;
+  constexpr auto kSilent = 2500ms;
+  constexpr double kAtLeast = 0.75;  // of the rate of publishing; over the whole window it is 0.5
+  Config config = testing::own_domain();
+  Participant others(config, "others");
+  recording::SurveyOptions options;
+  options.bus = config;
+  options.topics = {
+      {std::string(topics::imu.name), ros_type_name<ImuSample>(), topics::imu.qos, true}};
+  options.duration_s = kSurvey_s;
+  std::vector<recording::TopicSurvey> surveys;
+  std::thread listening([&] { surveys = recording::survey_bus(options); });
+  const bool listens = tests::wait_until(
+      [&] {
+        const auto there = others.discovered();
+        return std::any_of(there.begin(), there.end(), [](const DiscoveredEndpoint& endpoint) {
+          return !endpoint.writes && endpoint.dds_topic == "rt/imu/data";
+        });
+      },
+      testing::kForever);
+  std::this_thread::sleep_for(kSilent);
+  std::atomic<int> published{0};
+  const auto began = std::chrono::steady_clock::now();
+  std::chrono::duration<double> spoken{};
+  {
+    Publisher imu(others, topics::imu);
+    const Publishing publishing([&](Nanoseconds now_ns) {
+      imu.publish(to_message(imu_at_rest(now_ns, 9.81, 0.5)));
+      ++published;
+    });
+    listening.join();
+    spoken = std::chrono::steady_clock::now() - began;
+  }
+  ASSERT_TRUE(listens);
+  ASSERT_EQ(surveys.size(), 1U);
+  ASSERT_GT(surveys.front().messages, 1U);
+  EXPECT_GT(surveys.front().rate_hz, kAtLeast * published / spoken.count());
 }
 
 // ---- programs that say nothing ------------------------------------------------------------------

@@ -96,9 +96,16 @@ TEST_F(HostRestart, of_killed_processes_leaves_the_others_alone_and_is_listed) {
   std::filesystem::copy(part_, folder_.path("robot"), std::filesystem::copy_options::recursive);
   write_file(folder_.path("robot/restarts.csv"),
              "unix_s,program,restarted,lived_s,what\n7,trigpoint_lio_mapper,1,5,\"killed\"\n");
+  // A report on a part alone is no part of the whole, and the two differ.
+  for (const std::string& part : {folder_.path("robot"), part_}) {
+    const CommandResult report =
+        run_command({std::string(TRIGPOINT_BIN_DIR) + "/trigpoint", "report", part});
+    ASSERT_TRUE(std::filesystem::exists(part + "/report.html")) << report.output;
+  }
   const CommandResult collected = run_command(
       {script("collect"), folder_.path("whole"), folder_.path("robot"), part_, "--no-report"});
   EXPECT_EQ(collected.exit_code, 0) << collected.output;
+  EXPECT_FALSE(std::filesystem::exists(folder_.path("whole/report.html")));
   const std::string restarts = read_file(folder_.path("whole/restarts.csv"));
   EXPECT_EQ(std::count(restarts.begin(), restarts.end(), '\n'), 1 + 1 + 2) << restarts;
 }

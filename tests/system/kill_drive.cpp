@@ -3,9 +3,11 @@
 #include "kill_drive.hpp"
 
 #include "trigpoint/bus/bus.hpp"
+#include "trigpoint/bus/convert.hpp"
 #include "trigpoint/bus/participant_of.hpp"
 #include "trigpoint/bus/topics.hpp"
 #include "trigpoint/evaluation/trajectory_error.hpp"
+#include "trigpoint/export/session.hpp"
 
 #include "run_command.hpp"
 
@@ -14,12 +16,10 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <regex>
 #include <set>
-#include <sstream>
 #include <stdexcept>
 #include <thread>
 
@@ -28,24 +28,13 @@ namespace trigpoint::tests {
 namespace {
 
 using namespace std::chrono_literals;
-using Clock = std::chrono::steady_clock;
 namespace fs = std::filesystem;
 namespace topics = bus::topics;
 
-constexpr auto kPause = 500ms;       ///< shorter than a supervisor's patience (--still)
-constexpr double kWatched_s = 10.0;  ///< after a blow
-constexpr auto kHangFound = 25s;     ///< more than any watchdog's patience
+constexpr auto kPause = 500ms;    ///< shorter than a supervisor's patience (--still)
+constexpr auto kHangFound = 25s;  ///< more than any watchdog's patience
 constexpr auto kFirstWord = 120s;
 constexpr auto kReport = 300s;
-
-double seconds(Clock::duration duration) {
-  return std::chrono::duration<double>(duration).count();
-}
-
-struct Word {
-  Clock::time_point at;
-  std::string writer;
-};
 
 /// When each process said something.
 class Ear {
@@ -56,9 +45,14 @@ class Ear {
     listen(kGate, topics::fusion_odometry);
   }
 
-  std::vector<Word> words(const std::string& process) {
+  Words words() {
     const std::scoped_lock lock(mutex_);
-    return words_[process];
+    return words_;
+  }
+
+  bool heard(const std::string& process) {
+    const std::scoped_lock lock(mutex_);
+    return !words_[process].empty();
   }
 
  private:
@@ -66,14 +60,16 @@ class Ear {
     subscriptions_.push_back(std::make_unique<bus::Subscription<nav_msgs::msg::Odometry>>(
         participant_,
         topic,
-        [this, process](const nav_msgs::msg::Odometry&, const bus::MessageInfo& info) {
+        [this, process](const nav_msgs::msg::Odometry& odometry, const bus::MessageInfo& info) {
           const std::scoped_lock lock(mutex_);
-          words_[process].push_back({Clock::now(), bus::participant_of(info.writer_guid)});
+          words_[process].push_back({Clock::now(),
+                                     bus::from_message(odometry.header().stamp()),
+                                     bus::participant_of(info.writer_guid)});
         }));
   }
 
   std::mutex mutex_;
-  std::map<std::string, std::vector<Word>> words_;
+  Words words_;
   bus::Participant participant_;
   std::vector<std::unique_ptr<bus::Subscription<nav_msgs::msg::Odometry>>> subscriptions_;
 };
@@ -99,14 +95,6 @@ std::set<std::string> shared_memory_of(pid_t pid) {
 }
 
 /// Strikes and waits until the successor's number is known, or the pause is over.
-struct Struck {
-  Blow blow;
-  Clock::time_point at;
-  Clock::time_point returned;  ///< started again, or continued
-  bool restarted{false};
-  std::set<std::string> shared_memory;
-};
-
 Struck strike(const Blow& blow, const std::string& session) {
   const pid_t pid = number_of(session, blow.process);
   if (pid <= 0) {
@@ -131,41 +119,6 @@ Struck strike(const Blow& blow, const std::string& session) {
   return struck;
 }
 
-double longest_gap_s(const std::vector<Word>& words, Clock::time_point from, double window_s) {
-  Clock::time_point last = from;
-  double longest_s = 0.0;
-  const Clock::time_point end =
-      from + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(window_s));
-  for (const Word& word : words) {
-    if (word.at > from && word.at <= end) {
-      longest_s = std::max(longest_s, seconds(word.at - last));
-      last = word.at;
-    }
-  }
-  return std::max(longest_s, seconds(std::min(end, words.empty() ? end : words.back().at) - last));
-}
-
-BlowResult judge(const Struck& struck, Ear& ear) {
-  BlowResult result;
-  result.blow = struck.blow;
-  result.restarted = struck.restarted;
-  for (const std::string& process : {kMapper, kGate, kFilter}) {
-    const std::vector<Word> words = ear.words(process);
-    if (process != struck.blow.process) {
-      result.others_gap_s =
-          std::max(result.others_gap_s, longest_gap_s(words, struck.at, kWatched_s));
-      continue;
-    }
-    const auto first = std::find_if(
-        words.begin(), words.end(), [&](const Word& word) { return word.at >= struck.returned; });
-    if (first != words.end()) {
-      result.pick_up_s = seconds(first->at - struck.returned);
-      result.down_s = seconds(first->at - struck.at);
-    }
-  }
-  return result;
-}
-
 double listed_in(const std::string& report) {
   std::smatch found;
   return std::regex_search(report, found, std::regex("Scans missed: ([0-9]+)"))
@@ -183,15 +136,26 @@ std::uint64_t points_of_map(const std::string& file) {
   return 0;
 }
 
-void score(const std::string& session, DriveResult& result) {
+void score(const std::string& session,
+           const std::vector<Struck>& struck,
+           const Words& words,
+           DriveResult& result) {
   const auto truth = exporter::read_trajectory(session + "/truth.tum");
-  const auto error_of = [&](const char* name) {
-    const auto estimate = exporter::read_trajectory(session + "/" + name);
-    return evaluation::absolute_error(evaluation::associate(estimate, truth).pairs).position_m;
+  const auto against_truth = [&](const char* name) {
+    return evaluation::associate(exporter::read_trajectory(session + "/" + name), truth);
   };
-  result.rmse_m = error_of("fused.tum").rmse;
-  result.worst_m = error_of("fused.tum").max;
-  result.smoothed_rmse_m = error_of("fused_smoothed.tum").rmse;
+  const auto fused = against_truth("fused.tum");
+  const auto error = evaluation::absolute_error(fused.pairs).position_m;
+  result.rmse_m = error.rmse;
+  result.worst_m = error.max;
+  result.smoothed_rmse_m =
+      evaluation::absolute_error(against_truth("fused_smoothed.tum").pairs).position_m.rmse;
+  result.truth_s = to_seconds(truth.back().stamp_ns - truth.front().stamp_ns);
+  result.covered_s = fused.coverage.whole * result.truth_s;
+  for (const Struck& one : struck) {
+    result.blows.push_back(judge_blow(one, words, truth.back().stamp_ns, fused.pairs));
+    result.left_in_shared_memory.insert(one.shared_memory.begin(), one.shared_memory.end());
+  }
   result.map_points = points_of_map(session + "/map.pcd");
   result.scans_done = exporter::read_trajectory(session + "/lio.tum").size();
   for (const NamedCount& count : exporter::read_counts(session + "/log.counts.yaml")) {
@@ -223,7 +187,7 @@ DriveResult drive(const DriveSettings& settings, const std::vector<Blow>& blows)
   arguments.insert(arguments.end(), settings.more_arguments.begin(), settings.more_arguments.end());
   Command job(arguments, {{"TRIGPOINT_BIN", TRIGPOINT_BIN_DIR}});
   const auto give_up = Clock::now() + kFirstWord;
-  while (ear.words(kFilter).empty() && job.running() && Clock::now() < give_up) {
+  while (!ear.heard(kFilter) && job.running() && Clock::now() < give_up) {
     std::this_thread::sleep_for(10ms);
   }
   const Clock::time_point began = Clock::now();
@@ -241,11 +205,7 @@ DriveResult drive(const DriveSettings& settings, const std::vector<Blow>& blows)
   DriveResult result;
   result.exit_code = ended.exit_code;
   result.output = ended.output;
-  for (const Struck& one : struck) {
-    result.blows.push_back(judge(one, ear));
-    result.left_in_shared_memory.insert(one.shared_memory.begin(), one.shared_memory.end());
-  }
-  score(settings.session, result);
+  score(settings.session, struck, ear.words(), result);
   return result;
 }
 

@@ -23,13 +23,9 @@ constexpr double kDuration_s = 180.0;
 constexpr double kApart_s = 20.0;  ///< between two blows, at least
 constexpr double kFirst_s = 13.0;  ///< of a drive: odom has begun and is aligned
 constexpr int kBlowsInADrive = 8;
-constexpr double kPickUp_s = 2.0;
-/// Who lives may be silent for as long as it waits for the dead one (fusion_gate.lio_timeout_s).
-constexpr double kOthersGap_s = 1.5;
 constexpr double kErrorFactor = 1.2;
 constexpr double kErrorMore_m = 0.05;
-constexpr double kFullMap = 0.95;        ///< of the undisturbed run's points
-constexpr std::uint64_t kUncounted = 3;  ///< scans at the beginning and the end of a drive
+constexpr double kFullMap = 0.95;  ///< of the undisturbed run's points
 
 /// Three kills, then a stop: in ten drives 20 kills of each process, 10 pauses and 10 hangs.
 Blow blow_of(int number, double at_s) {
@@ -90,27 +86,27 @@ class Table {
   }
 
   void print_blows(const DriveResult& result) {
-    std::printf("  %6s  %-22s %-11s %9s %9s %12s\n",
+    std::printf("  %6s  %-22s %-11s %9s %9s %12s %13s\n",
                 "at s",
                 "process",
                 "blow",
                 "down s",
                 "pick-up s",
-                "others gap s");
+                "others gap s",
+                "worst after m");
     for (const BlowResult& one : result.blows) {
       ++blows_;
       kills_ += one.blow.kind == Kind::kKill ? 1 : 0;
       longest_pick_up_s_ = std::max(longest_pick_up_s_, one.pick_up_s);
-      const bool held = one.pick_up_s <= kPickUp_s && one.others_gap_s <= kOthersGap_s &&
-                        one.restarted == (one.blow.kind != Kind::kPause);
-      std::printf("  %6.1f  %-22s %-11s %9.2f %9.2f %12.2f%s\n",
+      std::printf("  %6.1f  %-22s %-11s %9.2f %9.2f %12.2f %13.2f%s\n",
                   one.blow.at_s,
                   one.blow.process.c_str(),
                   name_of(one.blow.kind),
                   one.down_s,
                   one.pick_up_s,
                   one.others_gap_s,
-                  bound(held));
+                  one.worst_after_m,
+                  bound(held(one)));
     }
   }
 
@@ -136,14 +132,18 @@ class Table {
                 static_cast<unsigned long long>(result.map_points),
                 static_cast<unsigned long long>(undisturbed.map_points),
                 bound(static_cast<double>(result.map_points) >= kFullMap * full));
-    const std::uint64_t missed =
-        result.scans_played - std::min(result.scans_played, result.scans_done);
-    const bool listed = result.scans_listed + kUncounted >= missed;
+    const double least_s = least_covered_s(undisturbed.covered_s, result.blows);
+    std::printf("  fused.tum covers %.1f of %.1f s, undisturbed %.1f s, at least %.1f s%s\n",
+                result.covered_s,
+                result.truth_s,
+                undisturbed.covered_s,
+                least_s,
+                bound(undisturbed.covered_s > 0.0 && result.covered_s >= least_s));
     std::printf("  scans: %llu played, %llu missed, %llu listed as missed%s\n",
                 static_cast<unsigned long long>(result.scans_played),
-                static_cast<unsigned long long>(missed),
+                static_cast<unsigned long long>(missed_scans(result)),
                 static_cast<unsigned long long>(result.scans_listed),
-                bound(listed));
+                bound(missed_scans_are_listed(result)));
     std::printf("  left in shared memory: %zu files%s\n",
                 result.left_in_shared_memory.size(),
                 bound(result.left_in_shared_memory.empty()));

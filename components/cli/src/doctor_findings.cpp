@@ -222,7 +222,10 @@ std::vector<Finding> slow_inputs(const std::vector<TopicSurvey>& surveys,
   std::vector<Finding> found;
   for (const TopicSurvey& survey : surveys) {
     const auto least = least_hz.find(survey.topic.name);
-    if (least != least_hz.end() && survey.messages > 0 && survey.rate_hz < least->second) {
+    // The least rate brings a first message and one more each period: nothing is called slow soon
+    // after its first message.
+    if (least != least_hz.end() && survey.messages > 0 &&
+        static_cast<double>(survey.messages) < least->second * survey.heard_s) {
       found.push_back(
           {survey.topic.name,
            number(survey.rate_hz) + " Hz; at least " + number(least->second) +

@@ -51,9 +51,14 @@ class Listener {
     survey_.topic = topic;
   }
 
-  TopicSurvey result(bus::Participant& participant, double duration_s) {
+  TopicSurvey result(bus::Participant& participant) {
     const Clock::time_point now = Clock::now();
-    survey_.rate_hz = static_cast<double>(survey_.messages) / duration_s;
+    if (first_heard_) {
+      survey_.heard_s = seconds_between(*first_heard_, now);
+    }
+    if (survey_.messages > 1) {
+      survey_.rate_hz = static_cast<double>(survey_.messages - 1) / survey_.heard_s;
+    }
     for (const auto& [writer, newest] : newest_) {
       survey_.silent_s[writer] = seconds_between(newest, now);
       if (!survey_.writers.contains(writer)) {
@@ -95,7 +100,9 @@ class Listener {
     ++survey_.messages;
     survey_.bytes += bytes.size();
     survey_.writers.insert(writer);
-    newest_[writer] = Clock::now();
+    const Clock::time_point now = Clock::now();
+    newest_[writer] = now;
+    first_heard_ = first_heard_.value_or(now);
     LioStatus status;
     if (survey_.topic.ros_type == bus::ros_type_name<LioStatus>() &&
         bus::decode_cdr(bytes, status)) {
@@ -153,6 +160,7 @@ class Listener {
   TopicSurvey survey_;
   std::map<std::string, Clock::time_point> newest_;  ///< message by writer, or when it was found
   std::optional<Clock::time_point> found_;           ///< the first writer
+  std::optional<Clock::time_point> first_heard_;     ///< the first message of anybody
   std::optional<Clock::time_point> without_track_since_;
   MeasurementChecks checks_;
   bus::SerializedSubscription subscription_;
@@ -174,7 +182,7 @@ std::vector<TopicSurvey> survey_bus(const SurveyOptions& options) {
   }
   std::vector<TopicSurvey> surveys;
   for (const auto& listener : listeners) {
-    surveys.push_back(listener->result(participant, options.duration_s));
+    surveys.push_back(listener->result(participant));
   }
   return surveys;
 }

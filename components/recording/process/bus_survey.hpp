@@ -24,7 +24,8 @@ namespace trigpoint::recording {
 struct TopicSurvey {
   KnownTopic topic;
   std::uint64_t messages{0};
-  double rate_hz{0.0};
+  double heard_s{0.0};  ///< from the first message to the end of the survey
+  double rate_hz{0.0};  ///< within heard_s; 0 with fewer than two messages
   std::uint64_t bytes{0};
   std::set<std::string> writers;              ///< GUIDs of those who were heard
   std::set<std::string> silent_writers;       ///< matched, but nothing came from them

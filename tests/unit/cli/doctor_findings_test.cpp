@@ -111,14 +111,26 @@ TEST(DoctorFindings, tell_swapped_coordinates_and_another_site_by_the_datum) {
 TEST(DoctorFindings, tell_low_rates_on_real_time_only) {
   TopicSurvey imu = survey("imu/data");
   imu.writers = {"a"};
-  imu.messages = 100;
+  imu.messages = 101;
+  imu.heard_s = 5.0;
   imu.rate_hz = 20.0;
   EXPECT_THAT(findings_of({imu}, {}, RobotConfig{}), one("imu/data", "20.0 Hz; at least 50.0"));
   TopicSurvey clock = survey("clock", "rosgraph_msgs/msg/Clock");
   clock.writers = {"b"};
   EXPECT_THAT(findings_of({imu, clock}, {}, RobotConfig{}), IsEmpty());
+  imu.messages = 501;
   imu.rate_hz = 100.0;
   EXPECT_THAT(findings_of({imu}, {}, RobotConfig{}), IsEmpty());
+}
+
+TEST(DoctorFindings, call_no_input_slow_that_was_first_heard_a_moment_ago) {
+  TopicSurvey fixes = survey("gps/fix", "sensor_msgs/msg/NavSatFix");
+  fixes.writers = {"a"};
+  fixes.messages = 1;
+  fixes.heard_s = 1.9;
+  EXPECT_THAT(findings_of({fixes}, {}, RobotConfig{}), IsEmpty());
+  fixes.heard_s = 2.1;
+  EXPECT_THAT(findings_of({fixes}, {}, RobotConfig{}), one("gps/fix", "0.0 Hz; at least 0.5"));
 }
 
 TEST(DoctorFindings, give_the_command_that_enlarges_socket_buffers) {
