@@ -171,7 +171,7 @@ void FusionGate::Impl::settle_others(const GpsStatus& gps,
   const auto settle = [&](std::uint64_t count, const std::string& code, const std::string& why) {
     for (; count > 0 && open > 0; --count, --open) {
       verdicts.record(gps.stamp_ns, false, code, why);
-      verdict_changed = true;
+      status_is_news = true;
     }
   };
   const std::uint64_t of_now = std::min(open, told.fixes);
@@ -199,7 +199,7 @@ void FusionGate::Impl::settle_others(const GpsStatus& gps,
 
 void FusionGate::Impl::take_raw_fix(const GnssFix& fix, Output& out) {
   ++fixes_seen;
-  verdict_changed = true;
+  status_is_news = true;
   queue.hear(fix.stamp_ns, now_ns);
   follow_healthiest(out);
   const geodesy::Geographic place{
@@ -275,7 +275,7 @@ bool FusionGate::Impl::tell_of(ToldFix told, Output& out) {
     }
   }
   if (late) {
-    verdict_changed = true;
+    status_is_news = true;
     verdicts.record(stamp_ns, false, late->code, late->reason);
     tell(out, Severity::kWarning, "fix_refused", late->reason);
     return true;
@@ -295,7 +295,7 @@ bool FusionGate::Impl::tell_of(ToldFix told, Output& out) {
 void FusionGate::Impl::record_unjudged(const ToldFix& told, const Refusal& otherwise) {
   const Refusal why = told.refusal().value_or(otherwise);
   verdicts.record(told.fix.stamp_ns, false, why.code, why.reason);
-  verdict_changed = true;
+  status_is_news = true;
 }
 
 void FusionGate::Impl::refuse_waiting(const Refusal& why) {
@@ -326,6 +326,7 @@ void FusionGate::Impl::follow_healthiest(Output& out) {
   if (!sources.select(now_ns)) {
     return;
   }
+  status_is_news = true;
   const std::string& writer = sources.followed();
   tell(out,
        writer.empty() ? Severity::kWarning : Severity::kInfo,
