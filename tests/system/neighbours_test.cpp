@@ -74,6 +74,61 @@ TEST_P(TwoOf, a_kind_say_so_and_the_later_one_ends_with_code_2) {
   EXPECT_THAT(first.output_so_far(), Not(HasSubstr("was first")));
 }
 
+/// What one of them says of itself, once it has been running for a while.
+class Claims {
+ public:
+  Claims(bus::Participant& participant, const std::string& role)
+      : words_(
+            participant,
+            topics::diagnostics,
+            [this, role](const diagnostic_msgs::msg::DiagnosticArray& m, const bus::MessageInfo&) {
+              const auto lines = bus::from_message(m);
+              const bool is_claim = lines.size() == 1 && lines[0].name == role + ": only one";
+              const std::scoped_lock lock(mutex_);
+              if (is_claim && std::stod(lines[0].values.at(0).second) > kLongerThanItsPlay_s) {
+                recorded_ = m;
+              }
+            }) {}
+
+  std::optional<diagnostic_msgs::msg::DiagnosticArray> recorded() {
+    const std::scoped_lock lock(mutex_);
+    return recorded_;
+  }
+
+ private:
+  static constexpr double kLongerThanItsPlay_s = 4.0;
+  std::mutex mutex_;
+  std::optional<diagnostic_msgs::msg::DiagnosticArray> recorded_;
+  bus::Subscription<diagnostic_msgs::msg::DiagnosticArray> words_;
+};
+
+TEST_P(TwoOf, a_kind_are_not_taken_from_a_recording_that_is_played) {
+  take_domain(116);
+  const std::string name = std::string("trigpoint_") + GetParam();
+  bus::Participant recorder(bus::Config{}, "recorder");
+  Claims claims(recorder, GetParam());
+  {
+    Command recorded({program(name)});
+    ASSERT_TRUE(wait_until([&] { return claims.recorded().has_value(); }))
+        << recorded.output_so_far();
+    recorded.signal(SIGKILL);
+    recorded.wait(5s);
+  }
+  // As a player has them that plays all topics of a recording.
+  bus::Participant player(bus::Config{}, "player");
+  const bus::Publisher mapper_status(player, topics::lio_status);
+  const bus::Publisher gate_status(player, topics::fusion_status);
+  bus::Publisher words(player, topics::diagnostics);
+  Command live({program(name)});
+  ASSERT_TRUE(wait_until([&] { return says(live, "ready"); })) << live.output_so_far();
+  EXPECT_TRUE(wait_until([&] {
+    words.publish(*claims.recorded());
+    return says(live, "is not counted") || !live.running();
+  })) << live.output_so_far();
+  EXPECT_TRUE(live.running()) << live.output_so_far();
+  EXPECT_THAT(live.output_so_far(), Not(HasSubstr("was first")));
+}
+
 INSTANTIATE_TEST_SUITE_P(Bus,
                          TwoOf,
                          ::testing::Values("lio_mapper", "fusion_gate"),
