@@ -145,6 +145,53 @@ TEST(TwoOf, a_kind_stay_where_the_first_has_died) {
   EXPECT_TRUE(second.running()) << second.output_so_far();
 }
 
+// ---- clocks of other computers ------------------------------------------------------------------
+
+TEST(ClockWatch, refuses_names_and_times_that_no_computer_has_and_goes_on) {
+  take_domain(119);
+  const TemporaryFolder folder;
+  bus::Participant participant(bus::Config{}, "clock_test");
+  bus::Publisher answers(participant, topics::clock_probe);
+  const auto answer = [&](const std::string& to,
+                          const std::string& computer,
+                          const std::string& asked_ns,
+                          const std::string& there_ns) {
+    const bus::Diagnostic line{
+        bus::DiagnosticLevel::kOk,
+        "clock: answer",
+        computer,
+        to,
+        {{"asked_ns", asked_ns}, {"heard_there_ns", there_ns}, {"answered_there_ns", there_ns}}};
+    answers.publish(bus::to_message(0, {&line, 1}));
+  };
+  const bus::Subscription<diagnostic_msgs::msg::DiagnosticArray> questions(
+      participant,
+      topics::clock_probe,
+      [&](const diagnostic_msgs::msg::DiagnosticArray& m, const bus::MessageInfo& info) {
+        const auto lines = bus::from_message(m);
+        if (lines.size() != 1 || lines[0].name != "clock: question") {
+          return;
+        }
+        const std::string& now_ns = lines[0].values.at(0).second;
+        answer(info.writer_guid, "evil\n0,evil", now_ns, now_ns);
+        answer(info.writer_guid, std::string(65, 'e') + "vil", now_ns, now_ns);
+        answer(info.writer_guid, "evil-late", now_ns, "9223372036854775807");
+        answer(info.writer_guid, "evil-huge", now_ns, "92233720368547758070");
+        answer(info.writer_guid, "good", now_ns, now_ns);
+      });
+  Command watch({program("trigpoint_clock_watch"), "--session", folder.path()});
+  const auto file = [&] {
+    return std::filesystem::exists(folder.path("clock.csv"))
+               ? tests::read_file(folder.path("clock.csv"))
+               : std::string();
+  };
+  EXPECT_TRUE(wait_until([&] { return file().find(",good,") != std::string::npos; }))
+      << watch.output_so_far();
+  EXPECT_THAT(file(), Not(HasSubstr("evil")));
+  EXPECT_TRUE(says(watch, "1 to 64 of A-Z a-z 0-9 . - _ are expected")) << watch.output_so_far();
+  EXPECT_TRUE(watch.running());
+}
+
 // ---- users --------------------------------------------------------------------------------------
 
 TEST(Users, that_differ_find_each_other_on_the_bus_in_both_directions) {
