@@ -74,6 +74,61 @@ TEST_P(TwoOf, a_kind_say_so_and_the_later_one_ends_with_code_2) {
   EXPECT_THAT(first.output_so_far(), Not(HasSubstr("was first")));
 }
 
+/// What one of them says of itself, once it has been running for a while.
+class Claims {
+ public:
+  Claims(bus::Participant& participant, const std::string& role)
+      : words_(
+            participant,
+            topics::diagnostics,
+            [this, role](const diagnostic_msgs::msg::DiagnosticArray& m, const bus::MessageInfo&) {
+              const auto lines = bus::from_message(m);
+              const bool is_claim = lines.size() == 1 && lines[0].name == role + ": only one";
+              const std::scoped_lock lock(mutex_);
+              if (is_claim && std::stod(lines[0].values.at(0).second) > kLongerThanItsPlay_s) {
+                recorded_ = m;
+              }
+            }) {}
+
+  std::optional<diagnostic_msgs::msg::DiagnosticArray> recorded() {
+    const std::scoped_lock lock(mutex_);
+    return recorded_;
+  }
+
+ private:
+  static constexpr double kLongerThanItsPlay_s = 4.0;
+  std::mutex mutex_;
+  std::optional<diagnostic_msgs::msg::DiagnosticArray> recorded_;
+  bus::Subscription<diagnostic_msgs::msg::DiagnosticArray> words_;
+};
+
+TEST_P(TwoOf, a_kind_are_not_taken_from_a_recording_that_is_played) {
+  take_domain(116);
+  const std::string name = std::string("trigpoint_") + GetParam();
+  bus::Participant recorder(bus::Config{}, "recorder");
+  Claims claims(recorder, GetParam());
+  {
+    Command recorded({program(name)});
+    ASSERT_TRUE(wait_until([&] { return claims.recorded().has_value(); }))
+        << recorded.output_so_far();
+    recorded.signal(SIGKILL);
+    recorded.wait(5s);
+  }
+  // As a player has them that plays all topics of a recording.
+  bus::Participant player(bus::Config{}, "player");
+  const bus::Publisher mapper_status(player, topics::lio_status);
+  const bus::Publisher gate_status(player, topics::fusion_status);
+  bus::Publisher words(player, topics::diagnostics);
+  Command live({program(name)});
+  ASSERT_TRUE(wait_until([&] { return says(live, "ready"); })) << live.output_so_far();
+  EXPECT_TRUE(wait_until([&] {
+    words.publish(*claims.recorded());
+    return says(live, "is not counted") || !live.running();
+  })) << live.output_so_far();
+  EXPECT_TRUE(live.running()) << live.output_so_far();
+  EXPECT_THAT(live.output_so_far(), Not(HasSubstr("was first")));
+}
+
 INSTANTIATE_TEST_SUITE_P(Bus,
                          TwoOf,
                          ::testing::Values("lio_mapper", "fusion_gate"),
@@ -88,6 +143,53 @@ TEST(TwoOf, a_kind_stay_where_the_first_has_died) {
   Command second({program("trigpoint_fusion_gate")});
   std::this_thread::sleep_for(3s);
   EXPECT_TRUE(second.running()) << second.output_so_far();
+}
+
+// ---- clocks of other computers ------------------------------------------------------------------
+
+TEST(ClockWatch, refuses_names_and_times_that_no_computer_has_and_goes_on) {
+  take_domain(119);
+  const TemporaryFolder folder;
+  bus::Participant participant(bus::Config{}, "clock_test");
+  bus::Publisher answers(participant, topics::clock_probe);
+  const auto answer = [&](const std::string& to,
+                          const std::string& computer,
+                          const std::string& asked_ns,
+                          const std::string& there_ns) {
+    const bus::Diagnostic line{
+        bus::DiagnosticLevel::kOk,
+        "clock: answer",
+        computer,
+        to,
+        {{"asked_ns", asked_ns}, {"heard_there_ns", there_ns}, {"answered_there_ns", there_ns}}};
+    answers.publish(bus::to_message(0, {&line, 1}));
+  };
+  const bus::Subscription<diagnostic_msgs::msg::DiagnosticArray> questions(
+      participant,
+      topics::clock_probe,
+      [&](const diagnostic_msgs::msg::DiagnosticArray& m, const bus::MessageInfo& info) {
+        const auto lines = bus::from_message(m);
+        if (lines.size() != 1 || lines[0].name != "clock: question") {
+          return;
+        }
+        const std::string& now_ns = lines[0].values.at(0).second;
+        answer(info.writer_guid, "evil\n0,evil", now_ns, now_ns);
+        answer(info.writer_guid, std::string(65, 'e') + "vil", now_ns, now_ns);
+        answer(info.writer_guid, "evil-late", now_ns, "9223372036854775807");
+        answer(info.writer_guid, "evil-huge", now_ns, "92233720368547758070");
+        answer(info.writer_guid, "good", now_ns, now_ns);
+      });
+  Command watch({program("trigpoint_clock_watch"), "--session", folder.path()});
+  const auto file = [&] {
+    return std::filesystem::exists(folder.path("clock.csv"))
+               ? tests::read_file(folder.path("clock.csv"))
+               : std::string();
+  };
+  EXPECT_TRUE(wait_until([&] { return file().find(",good,") != std::string::npos; }))
+      << watch.output_so_far();
+  EXPECT_THAT(file(), Not(HasSubstr("evil")));
+  EXPECT_TRUE(says(watch, "1 to 64 of A-Z a-z 0-9 . - _ are expected")) << watch.output_so_far();
+  EXPECT_TRUE(watch.running());
 }
 
 // ---- users --------------------------------------------------------------------------------------

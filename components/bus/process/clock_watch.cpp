@@ -25,6 +25,8 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <stdexcept>
+#include <utility>
 
 namespace {
 
@@ -41,12 +43,17 @@ Nanoseconds wall_clock_ns() {
 
 /// What bringup/host calls this computer, or the system.
 std::string own_name() {
-  if (const char* name = std::getenv("TRIGPOINT_HOST"); name != nullptr && *name != '\0') {
-    return name;
+  std::array<char, 256> of_system{};
+  gethostname(of_system.data(), of_system.size() - 1);
+  const char* given = std::getenv("TRIGPOINT_HOST");
+  const bool is_given = given != nullptr && *given != '\0';
+  const std::string name = is_given ? given : of_system.data();
+  if (const auto fault = bus::find_name_fault(name)) {
+    throw std::runtime_error((is_given ? "TRIGPOINT_HOST" : "the system's host name") +
+                             std::string(" is '") + name + "': " + *fault +
+                             "; set TRIGPOINT_HOST to another one");
   }
-  std::array<char, 256> name{};
-  gethostname(name.data(), name.size() - 1);
-  return name.data();
+  return name;
 }
 
 std::string milliseconds(Nanoseconds ns) {
@@ -75,14 +82,16 @@ Message to_message(const Probe& probe) {
   return bus::to_message(probe.asked_ns, {&line, 1});
 }
 
-Nanoseconds number_in(const bus::Diagnostic& line, const std::string& key) {
-  Nanoseconds number{0};
+/// Nothing where there is none, or one of more than 64 bits.
+std::optional<Nanoseconds> number_in(const bus::Diagnostic& line, const std::string& key) {
   for (const auto& [name, text] : line.values) {
-    if (name == key) {
-      std::from_chars(text.data(), text.data() + text.size(), number);
+    Nanoseconds number{0};
+    const char* end = text.data() + text.size();
+    if (name == key && std::from_chars(text.data(), end, number).ec == std::errc{}) {
+      return number;
     }
   }
-  return number;
+  return std::nullopt;
 }
 
 std::optional<Probe> from_message(const Message& message) {
@@ -90,11 +99,14 @@ std::optional<Probe> from_message(const Message& message) {
   if (lines.size() != 1) {
     return std::nullopt;
   }
-  return Probe{lines[0].message,
-               lines[0].hardware_id,
-               number_in(lines[0], "asked_ns"),
-               number_in(lines[0], "heard_there_ns"),
-               number_in(lines[0], "answered_there_ns")};
+  const auto asked_ns = number_in(lines[0], "asked_ns");
+  const auto heard_there_ns = number_in(lines[0], "heard_there_ns");
+  const auto answered_there_ns = number_in(lines[0], "answered_there_ns");
+  if (!asked_ns || !heard_there_ns || !answered_there_ns) {
+    return std::nullopt;
+  }
+  return Probe{
+      lines[0].message, lines[0].hardware_id, *asked_ns, *heard_there_ns, *answered_there_ns};
 }
 
 class Process {
@@ -130,9 +142,12 @@ class Process {
   void ask() {
     probes_.publish(to_message(Probe{name_, "", wall_clock_ns(), 0, 0}));
     for (const std::string& computer : answered_) {
-      tell(computer, *offsets_.best(computer));
+      if (const auto clock = offsets_.best(computer)) {
+        tell(computer, *clock);
+      }
     }
     answered_.clear();
+    std::erase_if(told_, [this](const auto& entry) { return !offsets_.best(entry.first); });
     file_.flush();
   }
 
@@ -141,12 +156,21 @@ class Process {
       probes_.publish(to_message(Probe{
           name_, info.writer_guid, probe.asked_ns, info.reception_stamp_ns, wall_clock_ns()}));
     } else if (probe.to == probes_.guid()) {
-      offsets_.add(
+      const auto refused = offsets_.add(
           probe.computer,
           {probe.asked_ns, probe.heard_there_ns, probe.answered_there_ns, info.reception_stamp_ns});
-      if (offsets_.best(probe.computer)) {
+      if (refused) {
+        tell_refused(*refused, info.writer_guid);
+      } else if (offsets_.best(probe.computer)) {
         answered_.insert(probe.computer);
       }
+    }
+  }
+
+  void tell_refused(const std::string& why, const std::string& writer) {
+    if (!std::exchange(told_of_refusal_, true)) {
+      log_.warning("an answer on clock_probe is refused (from " + writer + "): " + why +
+                   "; said once");
     }
   }
 
@@ -177,6 +201,7 @@ class Process {
   bus::ClockOffsets offsets_;
   std::set<std::string> answered_;  ///< since the last question
   std::map<std::string, bool> told_;
+  bool told_of_refusal_{false};
   bus::Participant participant_;
   bus::Publisher<Message> probes_;
   bus::Publisher<Message> diagnostics_;

@@ -155,7 +155,8 @@ void describe(Config& config, ConfigFields& fields) {
                 kPositive);
   fields.number("source_hold_s",
                 config.source_hold_s,
-                "a healthier GPS writer must stay healthier for this long before it is followed",
+                "a GPS writer must be healthier, or keep thresholds that the followed one does "
+                "not keep, for this long before it is followed",
                 kNotNegative);
   fields.number("lio_timeout_s",
                 config.lio_timeout_s,

@@ -162,7 +162,7 @@ struct FusionGate::Impl {
   std::optional<Nanoseconds> last_accepted_ns;
   std::deque<double> fix_intervals_s;
   std::uint64_t fixes_seen{0};
-  bool verdict_changed{false};
+  bool status_is_news{false};
 
   // --- mode smooth
   struct AwaitedReplacement {

@@ -30,7 +30,7 @@ void FusionGate::Impl::judge_waiting(Output& out) {
       return;
     }
     const ToldFix told = queue.take();
-    verdict_changed = true;
+    status_is_news = true;
     if (refusal) {
       note_refused(told, lio_pose);
       verdicts.record(told.fix.stamp_ns, false, refusal->code, refusal->reason);

@@ -174,7 +174,7 @@ void FusionGate::Impl::settle_others(const GpsStatus& gps,
   const auto settle = [&](std::uint64_t count, const std::string& code, const std::string& why) {
     for (; count > 0 && open > 0; --count, --open) {
       verdicts.record(gps.stamp_ns, false, code, why);
-      verdict_changed = true;
+      status_is_news = true;
     }
   };
   const std::uint64_t of_now = std::min(open, told.fixes);
@@ -202,7 +202,7 @@ void FusionGate::Impl::settle_others(const GpsStatus& gps,
 
 void FusionGate::Impl::take_raw_fix(const GnssFix& fix, Output& out) {
   ++fixes_seen;
-  verdict_changed = true;
+  status_is_news = true;
   queue.hear(fix.stamp_ns, now_ns);
   follow_healthiest(out);
   const geodesy::Geographic place{
@@ -278,7 +278,7 @@ bool FusionGate::Impl::tell_of(ToldFix told, Output& out) {
     }
   }
   if (late) {
-    verdict_changed = true;
+    status_is_news = true;
     verdicts.record(stamp_ns, false, late->code, late->reason);
     tell(out, Severity::kWarning, "fix_refused", late->reason);
     return true;
@@ -298,7 +298,7 @@ bool FusionGate::Impl::tell_of(ToldFix told, Output& out) {
 void FusionGate::Impl::record_unjudged(const ToldFix& told, const Refusal& otherwise) {
   const Refusal why = told.refusal().value_or(otherwise);
   verdicts.record(told.fix.stamp_ns, false, why.code, why.reason);
-  verdict_changed = true;
+  status_is_news = true;
 }
 
 void FusionGate::Impl::refuse_waiting(const Refusal& why) {
@@ -329,6 +329,7 @@ void FusionGate::Impl::follow_healthiest(Output& out) {
   if (!sources.select(now_ns)) {
     return;
   }
+  status_is_news = true;
   const std::string& writer = sources.followed();
   tell(out,
        writer.empty() ? Severity::kWarning : Severity::kInfo,

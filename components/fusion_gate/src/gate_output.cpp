@@ -378,11 +378,11 @@ void FusionGate::Impl::finish(Output& out, bool status_wanted) {
   }
   const bool due =
       !last_status_ns || to_seconds(now_ns - *last_status_ns) >= config.status_period_s;
-  if (status_wanted || verdict_changed || due) {
+  if (status_wanted || status_is_news || due) {
     out.status = status();
     out.status->judged = verdicts.take_new();
     last_status_ns = now_ns;
-    verdict_changed = false;
+    status_is_news = false;
   }
 }
 

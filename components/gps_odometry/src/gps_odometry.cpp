@@ -22,7 +22,6 @@ namespace trigpoint::gps_odometry {
 
 namespace {
 
-constexpr Nanoseconds kStatusInterval_ns = kNanosecondsPerSecond;
 constexpr double kFrozenSpeed_mps = 0.5;
 
 }  // namespace
@@ -63,8 +62,9 @@ struct GpsOdometry::Impl {
   void publish_odometry(Output& output);
   void try_warm_start(Output& output);
   Odometry odometry() const;
+  void tell_status(Output& output);
   GpsStatus status() const;
-  Surroundings around() const;
+  GpsHealth health() const;
 
   Config config;
   RobotConfig robot;
@@ -83,7 +83,7 @@ struct GpsOdometry::Impl {
   std::uint64_t imu_received{0};
   Nanoseconds now_ns{0};
   std::optional<Nanoseconds> published_ns;
-  std::optional<Nanoseconds> status_ns;
+  LastTold last_told;
 };
 
 void GpsOdometry::Impl::refuse(const std::string& reason,
@@ -115,7 +115,7 @@ void GpsOdometry::Impl::take_imu(const ImuSample& sample, Output& output) {
     filter->restart();
     now_ns = sample.stamp_ns;
     published_ns.reset();
-    status_ns.reset();
+    last_told = {};
   }
   if (verdict.sample) {
     election.begin(sample.stamp_ns);
@@ -128,9 +128,8 @@ void GpsOdometry::Impl::take_imu(const ImuSample& sample, Output& output) {
     try_warm_start(output);
     publish_odometry(output);
   }
-  if (!status_ns || now_ns - *status_ns >= kStatusInterval_ns) {
-    output.status = status();
-    status_ns = now_ns;
+  if (last_told.is_outdated(now_ns, health())) {
+    tell_status(output);
   }
 }
 
@@ -213,8 +212,7 @@ void GpsOdometry::Impl::take_fix(const GnssFix& message, Output& output) {
     }
     elect(*fix, output);
   }
-  output.status = status();
-  status_ns = now_ns;
+  tell_status(output);
 }
 
 bool GpsOdometry::Impl::is_refused(const std::optional<Refusal>& refusal,
@@ -379,12 +377,18 @@ void GpsOdometry::Impl::publish_odometry(Output& output) {
   output.odometry = std::move(candidate);
 }
 
-Surroundings GpsOdometry::Impl::around() const {
-  return {now_ns,
-          datum.has_value(),
-          imu_checks.is_faulty(),
-          admission.imu_is_silent(),
-          filter->is_doubtful()};
+GpsHealth GpsOdometry::Impl::health() const {
+  const Surroundings around{now_ns,
+                            datum.has_value(),
+                            imu_checks.is_faulty(),
+                            admission.imu_is_silent(),
+                            filter->is_doubtful()};
+  return health_of(filter->newest(), filter->yaw_sigma_rad(), around, config);
+}
+
+void GpsOdometry::Impl::tell_status(Output& output) {
+  output.status = status();
+  last_told = {now_ns, output.status->health};
 }
 
 GpsStatus GpsOdometry::Impl::status() const {
@@ -392,7 +396,7 @@ GpsStatus GpsOdometry::Impl::status() const {
   GpsStatus status;
   status.stamp_ns = now_ns;
   status.source = filter->source();
-  status.health = health_of(track, filter->yaw_sigma_rad(), around(), config);
+  status.health = health();
   status.datum_id = datum ? datum->id() : "";
   status.gnss_class = track.gnss_class;
   if (datum) {

@@ -8,6 +8,8 @@
 #include "counters.hpp"
 #include "track.hpp"
 
+#include <optional>
+
 namespace trigpoint::gps_odometry {
 
 /// What health depends on besides the Track.
@@ -23,6 +25,18 @@ GpsHealth health_of(const Track& track,
                     double yaw_sigma_rad,
                     const Surroundings& around,
                     const Config& config);
+
+/// When gps/status went out last, and with what.
+struct LastTold {
+  std::optional<Nanoseconds> stamp_ns;
+  GpsHealth health{GpsHealth::kInit};
+
+  /// After a second, and at once when health differs: it changes by time alone, too, and who
+  /// follows this filter may have a better one.
+  bool is_outdated(Nanoseconds now_ns, GpsHealth now) const {
+    return !stamp_ns || now_ns - *stamp_ns >= kNanosecondsPerSecond || now != health;
+  }
+};
 
 /// Age of the last accepted fix above which the filter counts as dead reckoning: the configured
 /// one, or two and a half intervals of a slow receiver.

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <utility>
 
 namespace trigpoint::shell {
 
@@ -17,10 +18,19 @@ namespace {
 
 constexpr const char* kAge = "running_s";
 constexpr const char* kProcess = "process";
+constexpr const char* kClaimant = "participant";
 /// Ages that differ by less say nothing about who was first.
 constexpr double kSameAge_s = 0.5;
 /// So long one that is too many stays, for the first one to hear of it.
 constexpr std::chrono::milliseconds kLastWord{300};
+/// Participants that are told of one by one.
+constexpr std::size_t kMostKnown = 64;
+
+/// Only digits of what the network says are printed.
+std::string number_of_process(const std::string& text) {
+  const long number = std::strtol(text.c_str(), nullptr, 10);
+  return number > 0 ? std::to_string(number) : "?";
+}
 
 }  // namespace
 
@@ -51,12 +61,13 @@ double OnlyOne::age_s() const {
 }
 
 void OnlyOne::claim() {
-  const bus::Diagnostic line{
-      bus::DiagnosticLevel::kOk,
-      name_,
-      "there may be one on a domain: who was first stays",
-      "",
-      {{kAge, std::to_string(age_s())}, {kProcess, std::to_string(getpid())}}};
+  const bus::Diagnostic line{bus::DiagnosticLevel::kOk,
+                             name_,
+                             "there may be one on a domain: who was first stays",
+                             "",
+                             {{kAge, std::to_string(age_s())},
+                              {kProcess, std::to_string(getpid())},
+                              {kClaimant, own_participant_}}};
   claims_.publish(bus::to_message(0, {&line, 1}));
 }
 
@@ -68,12 +79,14 @@ std::optional<OnlyOne::Claim> OnlyOne::claim_in(
     if (line.name != name) {
       continue;
     }
-    Claim claim{bus::participant_of(writer), "?", 0.0};
+    Claim claim{bus::participant_of(writer), "", "?", 0.0};
     for (const auto& [key, value] : line.values) {
       if (key == kAge) {
         claim.age_s = std::strtod(value.c_str(), nullptr);
       } else if (key == kProcess) {
-        claim.process = value;
+        claim.process = number_of_process(value);
+      } else if (key == kClaimant) {
+        claim.claimant = value;
       }
     }
     return claim;
@@ -82,7 +95,15 @@ std::optional<OnlyOne::Claim> OnlyOne::claim_in(
 }
 
 void OnlyOne::hear(const Claim& other) {
-  if (other.participant == own_participant_ || is_too_many_) {
+  if (other.participant == own_participant_ || other.participant.empty() || is_too_many_) {
+    return;
+  }
+  if (other.claimant != other.participant) {
+    if (!std::exchange(told_of_replay_, true)) {
+      log_.warning("a word of another " + role_ + " on `diagnostics` is not counted: DDS " +
+                   "participant " + other.participant + " sent it, which it does not name as " +
+                   "its own (a recording that is played?); said once");
+    }
     return;
   }
   const double older_s = other.age_s - age_s();
@@ -97,7 +118,7 @@ void OnlyOne::hear(const Claim& other) {
                "End the other one, or take another domain (ROS_DOMAIN_ID=N)");
     claim();
     loop_.every(kLastWord, [this] { loop_.stop(); });
-  } else if (known_.insert(other.participant).second) {
+  } else if (known_.size() < kMostKnown && known_.insert(other.participant).second) {
     log_.warning(who +
                  " has come to this DDS domain, where there may be one: it should end itself");
     claim();

@@ -18,6 +18,8 @@ namespace trigpoint::shell {
 /// Of a mapper or a gate a domain may have one: what two publish would be mixed without a word.
 /// Each says once a second on `diagnostics` for how long it has been running; who hears of one that
 /// has been for longer says so and ends its loop. The one that was first says so and goes on.
+/// A claim names the DDS participant that makes it: one that comes from another participant is a
+/// recorded one that somebody plays, and ends nobody.
 class OnlyOne {
  public:
   /// `role`: what there may be one of, e.g. "fusion_gate".
@@ -31,7 +33,8 @@ class OnlyOne {
 
  private:
   struct Claim {
-    std::string participant;
+    std::string participant;  ///< that sent it
+    std::string claimant;     ///< participant that it names as its own
     std::string process;
     double age_s{0.0};
   };
@@ -51,6 +54,7 @@ class OnlyOne {
   std::string own_participant_;
   std::set<std::string> known_;
   bool is_too_many_{false};
+  bool told_of_replay_{false};
   bus::Publisher<diagnostic_msgs::msg::DiagnosticArray> claims_;
   bus::Subscription<diagnostic_msgs::msg::DiagnosticArray> others_;
 };

@@ -4,7 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <random>
+#include <string>
 
 namespace trigpoint::bus {
 namespace {
@@ -62,6 +64,66 @@ TEST(ClockOffsets, forget_what_a_clock_was_before_it_was_set) {
     clocks.add("base", exchange(0, -9 * kMillisecond, kMillisecond, 0, kMillisecond));
   }
   EXPECT_EQ(clocks.best("base")->offset_ns, -9 * kMillisecond);
+}
+
+TEST(ClockOffsets, refuse_names_that_are_empty_long_or_unsafe_and_say_so) {
+  ClockOffsets clocks;
+  const ClockExchange good = exchange(0, 0, kMillisecond, 0, kMillisecond);
+  for (const std::string& name : {std::string(),
+                                  std::string(65, 'a'),
+                                  std::string("a,1\n"),
+                                  std::string("../a"),
+                                  std::string("\x1b[2J"),
+                                  std::string(1'000'000, 'x')}) {
+    const auto refused = clocks.add(name, good);
+    ASSERT_TRUE(refused.has_value());
+    EXPECT_NE(refused->find("1 to 64"), std::string::npos) << *refused;
+    EXPECT_LT(refused->size(), 200U);
+  }
+  EXPECT_EQ(clocks.size(), 0U);
+  EXPECT_FALSE(clocks.add(std::string(64, 'a'), good));
+  EXPECT_FALSE(clocks.add("robot-1.local_2", good));
+}
+
+TEST(ClockOffsets, refuse_stamps_whose_differences_would_overflow) {
+  constexpr Nanoseconds kLeast = std::numeric_limits<Nanoseconds>::min();
+  constexpr Nanoseconds kMost = std::numeric_limits<Nanoseconds>::max();
+  constexpr Nanoseconds kNow = 1'790'000'000 * kNanosecondsPerSecond;
+  ClockOffsets clocks;
+  for (const Nanoseconds wrong : {kLeast, kLeast + kNow, -kNow, kMost - kNow, kMost}) {
+    for (const ClockExchange& e : {ClockExchange{wrong, kNow, kNow, kNow},
+                                   ClockExchange{kNow, wrong, kNow, kNow},
+                                   ClockExchange{kNow, kNow, wrong, kNow},
+                                   ClockExchange{kNow, wrong, wrong, kNow},
+                                   ClockExchange{kNow, kLeast, kMost, kNow}}) {
+      EXPECT_TRUE(clocks.add("liar", e)) << wrong;
+    }
+  }
+  EXPECT_EQ(clocks.size(), 0U);
+}
+
+TEST(ClockOffsets, measure_a_computer_that_has_no_clock_and_begins_in_1970) {
+  constexpr Nanoseconds kNow = 1'790'000'000 * kNanosecondsPerSecond;
+  ClockOffsets clocks;
+  EXPECT_FALSE(clocks.add("base", exchange(kNow, -kNow, kMillisecond, 0, kMillisecond)));
+  EXPECT_EQ(clocks.best("base")->offset_ns, -kNow);
+}
+
+TEST(ClockOffsets, keep_at_most_64_computers_of_those_that_answer) {
+  ClockOffsets clocks;
+  const auto at = [](Nanoseconds now_ns) {
+    return exchange(now_ns, 0, kMillisecond, 0, kMillisecond);
+  };
+  for (std::size_t i = 0; i < ClockOffsets::kMostComputers; ++i) {
+    EXPECT_FALSE(clocks.add("c" + std::to_string(i), at(0)));
+  }
+  EXPECT_TRUE(clocks.add("one-more", at(0)));
+  EXPECT_EQ(clocks.size(), ClockOffsets::kMostComputers);
+  const Nanoseconds later_ns = ClockOffsets::kForgotten_ns + kNanosecondsPerSecond;
+  EXPECT_FALSE(clocks.add("c0", at(later_ns)));
+  EXPECT_FALSE(clocks.add("one-more", at(later_ns))) << "the others are silent";
+  EXPECT_TRUE(clocks.best("c0"));
+  EXPECT_FALSE(clocks.best("c1"));
 }
 
 TEST(ClockOffsets, leave_out_an_exchange_in_which_our_clock_was_set_back) {

@@ -74,55 +74,102 @@ TEST(GpsSources, change_over_to_a_healthier_one_only_after_the_hold_time) {
 
 constexpr double kHandOver_s = 0.5;  // issue: when it dies, stalls or degrades
 
-/// Two filters at 50 Hz, statuses at 5 Hz; `a` is followed. At 20 s something happens to it.
+/// Speaks as the filters do: odometry each time, a status with each fix (5 Hz), when health changes
+/// and once a second.
+class Speaker {
+ public:
+  Speaker(GpsSources& sources, std::string name) : sources_(sources), name_(std::move(name)) {}
+
+  void say(double now_s, GpsHealth health, double sigma_m = 0.1) {
+    const bool is_fix = health != GpsHealth::kDeadReckoning && now_s > next_fix_s_ - 1e-9;
+    if (is_fix) {
+      accepted_s_ = now_s;
+      next_fix_s_ = now_s + 0.2;
+    }
+    Odometry odometry;
+    odometry.stamp_ns = from_seconds(now_s);
+    odometry.pose_covariance.diagonal().head<3>().setConstant(sigma_m * sigma_m);
+    sources_.on_odometry(odometry, name_);
+    if (is_fix || health != told_ || now_s > told_s_ + 1.0 - 1e-9) {
+      sources_.on_status(status_at(now_s, health, accepted_s_), name_);
+      told_ = health;
+      told_s_ = now_s;
+    }
+  }
+
+ private:
+  GpsSources& sources_;
+  std::string name_;
+  double accepted_s_{0.0};
+  double next_fix_s_{0.0};
+  GpsHealth told_{GpsHealth::kInit};
+  double told_s_{0.0};
+};
+
+/// Two filters at 50 Hz, `a` is followed. At 20 s something happens to it.
 class TwoFilters : public ::testing::Test {
  protected:
-  enum class Event { kDies, kRepeatsItself, kDegrades };
+  enum class Event { kDies, kRepeatsItself, kDegrades, kReckonsDead, kGrowsUncertain };
 
   /// Seconds until `b` is followed; NaN when it never was.
-  double hand_over_s(Event event, double filter_hz = 50.0) {
+  double hand_over_s(Event event, double filter_hz = 50.0, double sigma_of_b_m = 0.1) {
     GpsSources sources{Config{}};
-    const auto say = [&](const std::string& who, double stamp_s, GpsHealth health) {
-      Odometry odometry;
-      odometry.stamp_ns = from_seconds(stamp_s);
-      sources.on_odometry(odometry, who);
-      sources.on_status(status_at(stamp_s, health, stamp_s), who);
-    };
+    Speaker a{sources, "a"};
+    Speaker b{sources, "b"};
     for (int k = 0; k < 1200; ++k) {
       const double now_s = 10.0 + k / filter_hz;
-      const bool happened = now_s >= kHappens_s;
-      if (!happened || event == Event::kDegrades) {
-        say("a", now_s, happened ? GpsHealth::kDegraded : GpsHealth::kOk);
-      } else if (event == Event::kRepeatsItself) {
-        say("a", kHappens_s, GpsHealth::kOk);
+      if (now_s < kHappens_s) {
+        a.say(now_s, GpsHealth::kOk);
+      } else if (event != Event::kDies) {
+        const bool repeats = event == Event::kRepeatsItself;
+        a.say(repeats ? kHappens_s : now_s,
+              event == Event::kDegrades      ? GpsHealth::kDegraded
+              : event == Event::kReckonsDead ? GpsHealth::kDeadReckoning
+                                             : GpsHealth::kOk,
+              event == Event::kGrowsUncertain ? 0.6 : 0.1);
       }
       sources.select(from_seconds(now_s));
       if (sources.followed() == "b") {
         return now_s - kHappens_s;
       }
       if (k > 0) {
-        say("b", now_s, GpsHealth::kOk);
+        b.say(now_s, GpsHealth::kOk, sigma_of_b_m);
       }
     }
     return kNaN;
+  }
+
+  void expect_hand_over_in_time(Event event) {
+    EXPECT_GE(hand_over_s(event), 0.0);
+    EXPECT_LT(hand_over_s(event), kHandOver_s);
   }
 
   static constexpr double kHappens_s = 20.0;
 };
 
 TEST_F(TwoFilters, change_over_within_half_a_second_when_the_followed_one_dies) {
-  EXPECT_GE(hand_over_s(Event::kDies), 0.0);
-  EXPECT_LT(hand_over_s(Event::kDies), kHandOver_s);
+  expect_hand_over_in_time(Event::kDies);
 }
 
 TEST_F(TwoFilters, change_over_within_half_a_second_when_the_followed_one_stalls) {
-  EXPECT_GE(hand_over_s(Event::kRepeatsItself), 0.0);
-  EXPECT_LT(hand_over_s(Event::kRepeatsItself), kHandOver_s);
+  expect_hand_over_in_time(Event::kRepeatsItself);
 }
 
 TEST_F(TwoFilters, change_over_within_half_a_second_when_the_followed_one_degrades) {
-  EXPECT_GE(hand_over_s(Event::kDegrades), 0.0);
-  EXPECT_LT(hand_over_s(Event::kDegrades), kHandOver_s);
+  expect_hand_over_in_time(Event::kDegrades);
+}
+
+TEST_F(TwoFilters, change_over_within_half_a_second_when_the_followed_one_says_dead_reckoning) {
+  expect_hand_over_in_time(Event::kReckonsDead);
+}
+
+TEST_F(TwoFilters,
+       change_over_within_half_a_second_when_only_the_followed_ones_sigma_is_too_large) {
+  expect_hand_over_in_time(Event::kGrowsUncertain);
+}
+
+TEST_F(TwoFilters, stay_where_they_are_when_both_sigmas_are_too_large) {
+  EXPECT_TRUE(std::isnan(hand_over_s(Event::kGrowsUncertain, 50.0, 0.6)));
 }
 
 TEST_F(TwoFilters, that_speak_once_a_second_are_not_taken_for_dead_between_two_words) {

@@ -5,6 +5,7 @@
 #include "drive.hpp"
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <random>
@@ -83,6 +84,34 @@ TEST_P(Outage, sigma_bounds_the_error_of_dead_reckoning) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Speeds, Outage, testing::Values(1.5, 5.0));
+
+class ChangeOfHealth : public testing::TestWithParam<const char*> {};
+
+/// Two of them come by time alone, when no fix is there to be told of.
+TEST_P(ChangeOfHealth, is_told_with_the_imu_sample_that_sees_it) {
+  Sensors sensors;
+  sensors.outage_from_s = kFrom_s;
+  const auto truth = drive(town(1.5, 3.0), kFrom_s + 32.0);
+  const Config config = config_with_datum(GetParam());
+  GpsOdometry filter(config, sensors.robot);
+  const Recorded result = run(filter, sense(truth, sensors, 1), truth);
+  const double last_fix_s = to_seconds(result.statuses.back().last_accepted_fix_ns - kEpoch_ns);
+  ASSERT_NEAR(last_fix_s, kFrom_s, 0.3);
+  for (const auto& [health, after_s] :
+       {std::pair{GpsHealth::kDeadReckoning, config.dead_reckoning_after_s},
+        std::pair{GpsHealth::kStale, config.stale_after_s}}) {
+    const auto told =
+        std::find_if(result.statuses.begin(), result.statuses.end(), [&](const GpsStatus& s) {
+          return s.stamp_ns > stamp_of(kFrom_s) && s.health == health;
+        });
+    ASSERT_NE(told, result.statuses.end());
+    const double late_s = to_seconds(told->stamp_ns - kEpoch_ns) - last_fix_s - after_s;
+    EXPECT_GE(late_s, 0.0);
+    EXPECT_LT(late_s, 1.5 / sensors.imu_hz);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Filters, ChangeOfHealth, testing::Values("ekf15", "eskf18"));
 
 TEST(CorrelatedErrors, of_code_positions_are_within_the_published_sigma) {
   int count = 0;

@@ -2,6 +2,8 @@
 // Copyright the Trigpoint developers
 #include "checks/gps_sources.hpp"
 
+#include "control/algorithm_one.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <tuple>
@@ -18,6 +20,9 @@ constexpr double kForgotten_s = 60.0;
 constexpr int kUsableRank = 2;
 
 }  // namespace
+
+GpsSources::GpsSources(const Config& config)
+    : config_(config), threshold_m_(threshold_sigma_m(config)) {}
 
 std::optional<std::string> GpsSources::on_odometry(const Odometry& odometry,
                                                    const std::string& writer) {
@@ -142,9 +147,19 @@ int GpsSources::rank_of(const GpsSource& source) const {
   return 6;
 }
 
+bool GpsSources::is_above_threshold(const GpsSource& source) const {
+  return source.status && source.odometry &&
+         !(source.odometry->pose_covariance.diagonal().head<3>().array() <=
+           threshold_m_.array().square())
+              .all();
+}
+
 bool GpsSources::is_better(const GpsSource& candidate, const GpsSource& current) const {
   if (rank_of(candidate) != rank_of(current)) {
     return rank_of(candidate) < rank_of(current);
+  }
+  if (is_above_threshold(candidate) != is_above_threshold(current)) {
+    return is_above_threshold(current);
   }
   if (!candidate.status || !current.status) {
     return false;
@@ -156,7 +171,8 @@ bool GpsSources::is_better(const GpsSource& candidate, const GpsSource& current)
 std::string GpsSources::best_alive(Nanoseconds now_ns) const {
   const auto order = [&](const GpsSource& source) {
     const Nanoseconds newest_ns = source.status ? source.status->last_accepted_fix_ns : 0;
-    return std::make_tuple(is_silent(source, now_ns), rank_of(source), -newest_ns);
+    return std::make_tuple(
+        is_silent(source, now_ns), rank_of(source), is_above_threshold(source), -newest_ns);
   };
   std::string best;
   for (const auto& [writer, source] : sources_) {

@@ -20,13 +20,14 @@ struct GpsSource {
   std::optional<GpsStatus> status;   ///< newest
 };
 
-/// The GPS writers on the bus, and which of them is followed: the healthiest, then the one with the
-/// newest accepted fix. The followed one is kept until it goes stale, falls silent for longer than
-/// it usually does while another one speaks, another one has been healthier for source_hold_s, or
-/// is ahead by source_timeout_s of accepted fixes.
+/// The GPS writers on the bus, and which of them is followed: the healthiest, then one whose sigma
+/// keeps the thresholds, then the one with the newest accepted fix. The followed one is kept until
+/// it goes stale, falls silent for longer than it usually does while another one speaks, or another
+/// one has for source_hold_s been healthier, kept the thresholds that it does not keep, or been
+/// ahead by source_timeout_s of accepted fixes.
 class GpsSources {
  public:
-  explicit GpsSources(const Config& config) : config_(config) {}
+  explicit GpsSources(const Config& config);
 
   /// A fault when the odometry cannot be used (stamp, frame, not finite): it is then not kept.
   std::optional<std::string> on_odometry(const Odometry& odometry, const std::string& writer);
@@ -50,10 +51,13 @@ class GpsSources {
   /// Lower is better: 0 ok, 1 degraded, 2 foreign (says nothing of itself), 3 init, 4 dead
   /// reckoning, 5 stale, 6 fault.
   int rank_of(const GpsSource& source) const;
+  /// On any axis, by its newest odometry, where it tells of itself; NaN is above.
+  bool is_above_threshold(const GpsSource& source) const;
   bool is_better(const GpsSource& candidate, const GpsSource& current) const;
   std::string best_alive(Nanoseconds now_ns) const;
 
   Config config_;
+  Eigen::Vector3d threshold_m_;
   std::map<std::string, GpsSource> sources_;
   std::string followed_;
   std::string challenger_;

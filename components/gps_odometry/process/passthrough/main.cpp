@@ -52,10 +52,11 @@ class Passthrough {
 
  private:
   /// Data time is what the sensors' stamps say. It goes on when no fixes come: the status must,
-  /// too.
+  /// too, and at once when health changes by time alone: the gate may have a better filter.
   void tick(Nanoseconds stamp_ns) {
     now_ns_ = stamp_ns;
-    if (now_ns_ < told_ns_ || now_ns_ - told_ns_ >= kNanosecondsPerSecond) {
+    if (now_ns_ < told_ns_ || now_ns_ - told_ns_ >= kNanosecondsPerSecond ||
+        health() != said_.health) {
       tell();
     }
   }
@@ -131,15 +132,19 @@ class Passthrough {
     }
   }
 
-  void tell() {
+  GpsHealth health() const {
     const double age_s = to_seconds(now_ns_ - said_.last_accepted_fix_ns);
+    return said_.fixes_accepted == 0 ? GpsHealth::kInit
+           : age_s > 30.0            ? GpsHealth::kStale
+           : age_s > 2.0             ? GpsHealth::kDeadReckoning
+           : assumed_                ? GpsHealth::kDegraded
+                                     : GpsHealth::kOk;
+  }
+
+  void tell() {
     said_.stamp_ns = told_ns_ = now_ns_;
     said_.source = "passthrough";
-    said_.health = said_.fixes_accepted == 0 ? GpsHealth::kInit
-                   : age_s > 30.0            ? GpsHealth::kStale
-                   : age_s > 2.0             ? GpsHealth::kDeadReckoning
-                   : assumed_                ? GpsHealth::kDegraded
-                                             : GpsHealth::kOk;
+    said_.health = health();
     status_.publish(bus::to_message(said_));
   }
 

@@ -63,7 +63,7 @@ struct Config {
   double max_inflation{100.0};               ///< of that factor
   double max_fix_age_s{2.3};  ///< against LIO's newest stamp; so long an earlier one is waited for
   double source_timeout_s{1.0};     ///< a GPS writer not heard for longer is stale
-  double source_hold_s{0.3};        ///< a healthier one must stay so for this long
+  double source_hold_s{0.3};        ///< a healthier or more certain one must stay so
   double lio_timeout_s{1.0};        ///< then the GPS odometry carries fusion/odometry
   double gps_only_after_s{10.0};    ///< the same where there has never been a LIO
   double imu_rate_timeout_s{0.5};   ///< then lio/odometry carries fusion/odometry
