@@ -28,7 +28,6 @@ constexpr std::size_t kSampleSizeAt = 32;
 constexpr std::int64_t kLeast_bytes = 1024;
 /// Of each writer; then the oldest are forgotten.
 constexpr std::size_t kMostFinished = 1024;
-/// Only when there is no room: links that are down for 10 s go on where they were.
 constexpr std::chrono::seconds kForgotten{30};
 
 /// Between two searches for such.
@@ -47,31 +46,6 @@ bool is_builtin(const Guid& writer) {
   return (writer.back() & 0xC0U) == 0xC0U;
 }
 
-void append(std::vector<std::uint8_t>& bytes, std::uint64_t number, unsigned size) {
-  for (unsigned i = 0; i < size; ++i) {
-    bytes.push_back(static_cast<std::uint8_t>(number >> (8 * i)));
-  }
-}
-
-/// A datagram by which the writer says that this sample will not come.
-std::vector<std::uint8_t> gap(const Guid& writer, std::uint64_t number) {
-  constexpr std::uint8_t kLittleEndian = 1;
-  constexpr std::uint8_t kGap = 0x08;
-  constexpr std::uint64_t kLength = 28;
-  std::vector<std::uint8_t> bytes{'R', 'T', 'P', 'S', 2, 3, 1, 15};
-  bytes.insert(bytes.end(), writer.begin(), writer.begin() + kPrefix_bytes);
-  bytes.insert(bytes.end(), {kGap, kLittleEndian});
-  append(bytes, kLength, 2);
-  append(bytes, 0, 4);  // every reader
-  bytes.insert(bytes.end(), writer.begin() + kPrefix_bytes, writer.end());
-  for (const std::uint64_t end : {number, number + 1}) {  // from, and up to which
-    append(bytes, end >> 32, 4);
-    append(bytes, end, 4);
-  }
-  append(bytes, 0, 4);  // nothing beyond
-  return bytes;
-}
-
 void set_prefix(Guid& source, std::span<const std::uint8_t> bytes, std::size_t place) {
   if (bytes.size() >= place + kPrefix_bytes) {
     std::copy_n(bytes.begin() + static_cast<std::ptrdiff_t>(place), kPrefix_bytes, source.begin());
@@ -87,7 +61,7 @@ void set_entity(Guid& source, EntityNumber entity) {
 }  // namespace
 
 struct IncomingSamples::Fragments {
-  Key key;
+  Guid writer{};
   Time now;
   std::uint64_t number{0};
   std::int64_t size_bytes{0};
@@ -95,8 +69,6 @@ struct IncomingSamples::Fragments {
   std::uint64_t first{0};  ///< counted from 0
   std::uint64_t count{0};
   std::uint64_t of{0};  ///< the sample's
-
-  const Guid& writer() const { return std::get<Guid>(key); }
 
   /// False when the submessage contradicts itself.
   bool read(const Submessage& part) {
@@ -108,7 +80,7 @@ struct IncomingSamples::Fragments {
     if (!carried || begin == 0 || fragment_bytes == 0 || size_bytes == 0 || count == 0) {
       return false;
     }
-    set_entity(std::get<Guid>(key), carried->writer);
+    set_entity(writer, carried->writer);
     number = carried->number;
     first = begin - 1;
     of = (static_cast<std::uint64_t>(size_bytes) + fragment_bytes - 1) / fragment_bytes;
@@ -160,12 +132,10 @@ void IncomingSamples::free_all_of(const Stream& stream) {
 void IncomingSamples::remove_writer(const Guid& guid) {
   const std::lock_guard lock(mutex_);
   writers_.erase(guid);
-  const auto begin = streams_.lower_bound({guid, nullptr});
-  auto end = begin;
-  for (; end != streams_.end() && std::get<Guid>(end->first) == guid; ++end) {
-    free_all_of(end->second);
+  if (const auto found = streams_.find(guid); found != streams_.end()) {
+    free_all_of(found->second);
+    streams_.erase(found);
   }
-  streams_.erase(begin, end);
 }
 
 void IncomingSamples::remove_participant(std::span<const std::uint8_t> prefix) {
@@ -175,7 +145,7 @@ void IncomingSamples::remove_participant(std::span<const std::uint8_t> prefix) {
   const std::lock_guard lock(mutex_);
   std::erase_if(writers_, [&](const auto& each) { return is_of_it(each.first); });
   std::erase_if(streams_, [&](const auto& each) {
-    const bool goes = is_of_it(std::get<Guid>(each.first));
+    const bool goes = is_of_it(each.first);
     if (goes) {
       free_all_of(each.second);
     }
@@ -203,9 +173,7 @@ IncomingSamples::Terms IncomingSamples::terms_of(const Guid& writer) const {
   return terms;
 }
 
-IncomingSamples::Verdict IncomingSamples::judge(const void* port,
-                                                std::span<const std::uint8_t> datagram,
-                                                Time now) {
+IncomingSamples::Verdict IncomingSamples::judge(std::span<const std::uint8_t> datagram, Time now) {
   Verdict verdict;
   Guid source{};
   set_prefix(source, datagram, kPrefixOfMessageAt);
@@ -216,10 +184,10 @@ IncomingSamples::Verdict IncomingSamples::judge(const void* port,
     } else if (part.kind == Submessage::kHeartbeat) {
       if (const auto told = heartbeat_of(part)) {
         set_entity(source, told->writer);
-        forget_before({source, port}, told->first, verdict);
+        forget_before(source, *told);
       }
     } else if (part.kind == Submessage::kDataFragment) {
-      Fragments came{.key = {source, port}, .now = now};
+      Fragments came{.writer = source, .now = now};
       verdict.is_refused = !came.read(part);
       if (!verdict.is_refused) {
         take(came, verdict);
@@ -236,16 +204,17 @@ std::int64_t IncomingSamples::open_bytes() const {
 }
 
 void IncomingSamples::take(const Fragments& came, Verdict& verdict) {
-  const Terms terms = terms_of(came.writer());
+  const Terms terms = terms_of(came.writer);
   const auto most = terms.share == kBulk ? kLargestMessage_bytes : kLargestSmallMessage_bytes;
+  if (!terms.is_read) {
+    verdict.is_ignored = came.size_bytes > most;
+    return;  // the middleware takes no memory for these
+  }
   if (came.size_bytes > most) {
     verdict.is_refused = true;
     return;
   }
-  if (!terms.is_read) {
-    return;  // the middleware takes no memory for these
-  }
-  const auto found = streams_.find(came.key);
+  const auto found = streams_.find(came.writer);
   if (found == streams_.end()) {
     begin(came, terms, verdict);
     return;
@@ -264,21 +233,21 @@ void IncomingSamples::take(const Fragments& came, Verdict& verdict) {
 }
 
 void IncomingSamples::begin(const Fragments& came, const Terms& terms, Verdict& verdict) {
-  if (const auto known = streams_.find(came.key); known != streams_.end() && terms.keeps_one) {
+  if (const auto known = streams_.find(came.writer); known != streams_.end() && terms.keeps_one) {
     Stream& stream = known->second;
     if (!stream.open.empty() && stream.open.rbegin()->first > came.number) {
-      verdict.is_outdated = true;
+      verdict.is_ignored = true;
       return;
     }
     free_all_of(stream);
     stream.open.clear();
   }
   const std::int64_t bytes = cost_bytes(came.size_bytes);
-  if (!make_room(came, terms.share, bytes, verdict)) {
+  if (!make_room(terms.share, bytes, came.now)) {
     verdict.is_refused = true;
     return;
   }
-  Stream& stream = streams_[came.key];
+  Stream& stream = streams_[came.writer];
   set_terms(stream, terms);
   Sample& sample = stream.open[came.number];
   sample.size_bytes = came.size_bytes;
@@ -316,55 +285,53 @@ void IncomingSamples::note(const Fragments& came, Stream& stream, Sample& sample
     stream.finished.erase(stream.finished.begin());
   }
   if (stream.terms.is_builtin && stream.open.empty()) {
-    streams_.erase(came.key);  // anybody may claim to be somebody, so nothing is kept of them
+    streams_.erase(came.writer);  // anybody may claim to be somebody, so nothing is kept of them
   }
 }
 
-/// The writer does not have them any more.
-void IncomingSamples::forget_before(const Key& key, std::uint64_t first, Verdict& verdict) {
-  const auto found = streams_.find(key);
-  if (found == streams_.end() || found->second.terms.keeps_one) {
+/// The writer does not have them any more, and the middleware drops them: at a heartbeat that is
+/// newer than those before, as it counts them.
+void IncomingSamples::forget_before(const Guid& writer, const HeartbeatOf& told) {
+  const auto found = streams_.find(writer);
+  if (found == streams_.end() || told.count <= found->second.last_heartbeat) {
     return;
   }
   Stream& stream = found->second;
-  const auto end = stream.open.lower_bound(first);
+  stream.last_heartbeat = told.count;
+  if (stream.terms.keeps_one) {
+    return;
+  }
+  const auto end = stream.open.lower_bound(told.first);
   for (auto each = stream.open.begin(); each != end; ++each) {
     open_bytes_[stream.terms.share] -= cost_bytes(each->second.size_bytes);
-    verdict.gaps.push_back(gap(std::get<Guid>(key), each->first));
   }
   stream.open.erase(stream.open.begin(), end);
-  stream.finished.erase(stream.finished.begin(), stream.finished.lower_bound(first));
+  stream.finished.erase(stream.finished.begin(), stream.finished.lower_bound(told.first));
 }
 
-/// Of what nothing came for long is given up where there is no room else. A best-effort reader
-/// hears no gaps: what it has stays until the writer sends something newer or goes.
-bool IncomingSamples::make_room(const Fragments& came,
-                                Share share,
-                                std::int64_t bytes,
-                                Verdict& verdict) {
+/// Anybody may claim to be a participant, so of discovery what nothing came for long is forgotten
+/// where there is no room else. What others have begun stays: nothing tells the middleware to give
+/// it up.
+bool IncomingSamples::make_room(Share share, std::int64_t bytes, Time now) {
   if (open_bytes_[share] + bytes <= kBudgets[share]) {
     return true;
   }
-  const void* port = std::get<const void*>(came.key);
-  const auto [searched, is_first] = searched_.emplace(std::pair(port, share), came.now);
-  if (!is_first && came.now - searched->second < kBetweenSearches) {
+  if (share != kOther || now - searched_ < kBetweenSearches) {
     return false;
   }
-  searched->second = came.now;
-  for (auto& [key, stream] : streams_) {
-    const bool hears_gaps = std::get<const void*>(key) == port;
-    if (stream.terms.share != share || stream.terms.keeps_one || !hears_gaps) {
-      continue;
+  searched_ = now;
+  for (auto& [writer, stream] : streams_) {
+    if (stream.terms.is_builtin) {
+      std::erase_if(stream.open, [&](const auto& each) {
+        const bool goes = now - each.second.touched > kForgotten;
+        open_bytes_[share] -= goes ? cost_bytes(each.second.size_bytes) : 0;
+        return goes;
+      });
     }
-    std::erase_if(stream.open, [&, &writer = std::get<Guid>(key)](const auto& each) {
-      const bool goes = came.now - each.second.touched > kForgotten;
-      if (goes) {
-        open_bytes_[share] -= cost_bytes(each.second.size_bytes);
-        verdict.gaps.push_back(gap(writer, each.first));
-      }
-      return goes;
-    });
   }
+  std::erase_if(streams_, [](const auto& each) {
+    return each.second.terms.is_builtin && each.second.open.empty();
+  });
   return open_bytes_[share] + bytes <= kBudgets[share];
 }
 

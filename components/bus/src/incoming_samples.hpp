@@ -14,27 +14,25 @@
 #include <mutex>
 #include <span>
 #include <string>
-#include <tuple>
-#include <utility>
 #include <vector>
 
 namespace trigpoint::bus {
 
 using Guid = std::array<std::uint8_t, 16>;
 
-/// Keeps count of what the middleware holds. So that the count is true whatever a stranger sends, a
-/// sample leaves it unfinished only when the middleware is told to give it up, too.
+/// Keeps count of what the middleware holds: a sample leaves it when it is whole, or when the
+/// middleware gives it up, too, not because of its age.
 class IncomingSamples {
  public:
   using Time = std::chrono::steady_clock::time_point;
 
   struct Verdict {
-    bool is_refused{false};   ///< too large, without room, or not what it claims
-    bool is_outdated{false};  ///< of a best-effort writer that has begun a newer sample
-    /// Datagrams for the middleware before this one: gaps where samples were that will not come.
-    std::vector<std::vector<std::uint8_t>> gaps;
+    bool is_refused{false};  ///< too large, without room, or not what it claims
+    /// Nobody here could take it: from a best-effort writer that has begun a newer sample, or large
+    /// and from one that is not known yet or not read any more.
+    bool is_ignored{false};
 
-    bool passes() const { return !is_refused && !is_outdated; }
+    bool passes() const { return !is_refused && !is_ignored; }
   };
 
   void add_reader(const std::string& dds_topic, const Qos& qos);
@@ -45,8 +43,7 @@ class IncomingSamples {
   void remove_writer(const Guid& guid);
   void remove_participant(std::span<const std::uint8_t> prefix);
 
-  /// Of a datagram that came for `port`, whose gaps reach the same readers.
-  Verdict judge(const void* port, std::span<const std::uint8_t> datagram, Time now);
+  Verdict judge(std::span<const std::uint8_t> datagram, Time now);
 
   /// Announced by fragments and not complete, in all.
   std::int64_t open_bytes() const;
@@ -81,10 +78,9 @@ class IncomingSamples {
     Time touched;
   };
 
-  using Key = std::tuple<Guid, const void*>;
-
   struct Stream {
     Terms terms;
+    std::uint32_t last_heartbeat{0};  ///< its count
     std::map<std::uint64_t, Sample> open;
     std::map<std::uint64_t, std::int64_t> finished;  ///< sizes; repairs of these may still come
   };
@@ -95,17 +91,17 @@ class IncomingSamples {
   void take(const Fragments& came, Verdict& verdict);
   void begin(const Fragments& came, const Terms& terms, Verdict& verdict);
   void note(const Fragments& came, Stream& stream, Sample& sample);
-  void forget_before(const Key& key, std::uint64_t first, Verdict& verdict);
-  bool make_room(const Fragments& came, Share share, std::int64_t bytes, Verdict& verdict);
+  void forget_before(const Guid& writer, const HeartbeatOf& told);
+  bool make_room(Share share, std::int64_t bytes, Time now);
   void set_terms(Stream& stream, const Terms& terms);
   void free_all_of(const Stream& stream);
 
   mutable std::mutex mutex_;
   std::map<std::string, Readers> topics_;
   std::map<Guid, Writer> writers_;
-  std::map<Key, Stream> streams_;
+  std::map<Guid, Stream> streams_;
   std::array<std::int64_t, kShares> open_bytes_{};
-  std::map<std::pair<const void*, Share>, Time> searched_;  ///< for what may be given up
+  Time searched_{};  ///< for what may be forgotten
 };
 
 }  // namespace trigpoint::bus

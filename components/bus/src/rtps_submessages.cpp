@@ -20,6 +20,7 @@ constexpr std::size_t kNumberOfDataAt = 16;
 constexpr std::size_t kWriterOfHeartbeatAt = 8;
 constexpr std::size_t kFirstOfHeartbeatAt = 12;
 constexpr std::size_t kLastOfHeartbeatAt = 20;
+constexpr std::size_t kCountOfHeartbeatAt = 28;
 
 template <class Number>
 std::optional<Number> number_at(const Submessage& part, std::size_t place) {
@@ -114,10 +115,11 @@ std::optional<CarriedSample> carried_by(const Submessage& data) {
 std::optional<HeartbeatOf> heartbeat_of(const Submessage& heartbeat) {
   const auto writer = entity_at(heartbeat, kWriterOfHeartbeatAt);
   const auto first = sequence_number_at(heartbeat, kFirstOfHeartbeatAt);
-  if (!writer || !first) {
+  const auto count = heartbeat.word_at(kCountOfHeartbeatAt);
+  if (!writer || !first || !count) {
     return std::nullopt;
   }
-  return HeartbeatOf{*writer, *first};
+  return HeartbeatOf{*writer, *first, *count};
 }
 
 std::optional<CarriedSample> carried_sample(std::span<const std::uint8_t> datagram) {

@@ -48,6 +48,7 @@ std::optional<CarriedSample> carried_by(const Submessage& data);
 struct HeartbeatOf {
   EntityNumber writer{0};
   std::uint64_t first{0};  ///< of the samples that it still has
+  std::uint32_t count{0};
 };
 
 std::optional<HeartbeatOf> heartbeat_of(const Submessage& heartbeat);

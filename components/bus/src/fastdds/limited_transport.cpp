@@ -71,11 +71,7 @@ class LimitedTransport : public rtps::ChainingTransport {
                std::uint32_t size,
                const Locator_t& local,
                const Locator_t& remote) override {
-    const auto verdict =
-        incoming_.samples->judge(next, {bytes, size}, std::chrono::steady_clock::now());
-    for (const auto& gap : verdict.gaps) {
-      next->OnDataReceived(gap.data(), static_cast<std::uint32_t>(gap.size()), local, remote);
-    }
+    const auto verdict = incoming_.samples->judge({bytes, size}, std::chrono::steady_clock::now());
     if (verdict.passes()) {
       next->OnDataReceived(bytes, size, local, remote);
     } else if (verdict.is_refused) {
