@@ -10,6 +10,9 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <filesystem>
+#include <iterator>
+#include <stdexcept>
 
 namespace trigpoint::bus {
 namespace {
@@ -83,6 +86,19 @@ TEST_F(CycloneSettings, know_no_shared_memory_and_say_so_at_the_door) {
   } catch (const std::runtime_error& error) {
     EXPECT_THAT(error.what(), ::testing::HasSubstr("bus.shared_memory"));
   }
+}
+
+std::ptrdiff_t threads_of_this_process() {
+  const std::filesystem::directory_iterator all("/proc/self/task");
+  return std::distance(begin(all), end(all));
+}
+
+TEST_F(CycloneSettings, of_security_that_cannot_be_read_leave_no_domain_behind) {
+  const auto before = threads_of_this_process();
+  Config config = own_domain();
+  config.security_folder = "/nowhere/at/all";
+  EXPECT_THROW(Participant(config, "wrong"), std::runtime_error);
+  EXPECT_EQ(threads_of_this_process(), before);  // a domain has some
 }
 
 TEST(SmallDatagrams, carry_large_clouds) {

@@ -9,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <cstdlib>
@@ -202,6 +203,45 @@ TEST(PacedWriter, goes_on_when_readers_leave_and_the_middleware_paces) {
     GTEST_SKIP() << "Fast DDS only";
   }
   expect_goes_on_when_readers_leave(60, true);
+}
+
+diagnostic_msgs::msg::DiagnosticArray diagnostics_of(std::size_t bytes) {
+  diagnostic_msgs::msg::DiagnosticArray message;
+  message.status().resize(1);
+  message.status().front().message(std::string(bytes, 'x'));
+  return message;
+}
+
+TEST(SmallTopics, have_small_messages_in_both_directions) {
+  constexpr std::size_t kTooLarge_bytes = 1'100'000;
+  constexpr std::size_t kAllowed_bytes = 900'000;
+  auto without_limit = topics::diagnostics;
+  without_limit.qos = without_limit.qos.with_depth(1).as_bulk();
+  Collected<Event> events;
+  Collected<std::size_t> heard;
+  Participant here(own_domain(), "here", [&](const Event& event) { events.add(event); });
+  Participant there(own_domain(), "there");
+  Readers readers;
+  const Subscription<diagnostic_msgs::msg::DiagnosticArray> subscription(
+      there, topics::diagnostics, [&](const auto& message, const MessageInfo&) {
+        heard.add(message.status().front().message().size());
+      });
+  Publisher limited(here, topics::diagnostics);
+  EXPECT_FALSE(limited.publish(diagnostics_of(kTooLarge_bytes)));
+  const auto told = events.items();
+  EXPECT_TRUE(std::any_of(told.begin(), told.end(), [](const Event& event) {
+    return event.code == "bus_sample_not_sent";
+  }));
+  Publisher unlimited(here, without_limit, readers.events());
+  ASSERT_TRUE(readers.wait_for(1));
+  for (const std::size_t bytes : {kAllowed_bytes, kTooLarge_bytes, kAllowed_bytes}) {
+    const std::size_t before = heard.size();
+    EXPECT_TRUE(unlimited.publish(diagnostics_of(bytes)));
+    if (bytes == kAllowed_bytes) {
+      ASSERT_TRUE(heard.wait_for(before + 1));
+    }
+  }
+  EXPECT_THAT(heard.items(), ::testing::Each(kAllowed_bytes));
 }
 
 /// Files in /dev/shm that this process has mapped.

@@ -20,6 +20,7 @@ constexpr std::size_t kNumberOfDataAt = 16;
 constexpr std::size_t kWriterOfHeartbeatAt = 8;
 constexpr std::size_t kFirstOfHeartbeatAt = 12;
 constexpr std::size_t kLastOfHeartbeatAt = 20;
+constexpr std::size_t kCountOfHeartbeatAt = 28;
 
 template <class Number>
 std::optional<Number> number_at(const Submessage& part, std::size_t place) {
@@ -81,6 +82,12 @@ std::optional<std::uint16_t> Submessage::half_word_at(std::size_t place) const {
   return number_at<std::uint16_t>(*this, place);
 }
 
+std::size_t Submessage::size() const {
+  const std::size_t length = half_word_at(2).value_or(0);
+  const bool is_last = length == 0 && kind != kPad && kind != kInfoTimestamp;
+  return is_last ? rest.size() : std::min(rest.size(), kSubmessageHeader_bytes + length);
+}
+
 void visit_submessages(std::span<const std::uint8_t> datagram,
                        const std::function<bool(const Submessage&)>& visit) {
   if (datagram.size() < kMessageHeader_bytes || std::memcmp(datagram.data(), "RTPS", 4) != 0) {
@@ -92,13 +99,27 @@ void visit_submessages(std::span<const std::uint8_t> datagram,
     if (!visit(part)) {
       return;
     }
-    const std::size_t length = part.half_word_at(2).value_or(0);
-    const bool is_last = length == 0 && part.kind != kPad && part.kind != kInfoTimestamp;
-    if (is_last || rest.size() < kSubmessageHeader_bytes + length) {
-      return;
-    }
-    rest = rest.subspan(kSubmessageHeader_bytes + length);
+    rest = rest.subspan(part.size());
   }
+}
+
+std::optional<CarriedSample> carried_by(const Submessage& data) {
+  const auto writer = entity_at(data, kWriterOfDataAt);
+  const auto number = sequence_number_at(data, kNumberOfDataAt);
+  if (!writer || !number) {
+    return std::nullopt;
+  }
+  return CarriedSample{*writer, *number};
+}
+
+std::optional<HeartbeatOf> heartbeat_of(const Submessage& heartbeat) {
+  const auto writer = entity_at(heartbeat, kWriterOfHeartbeatAt);
+  const auto first = sequence_number_at(heartbeat, kFirstOfHeartbeatAt);
+  const auto count = heartbeat.word_at(kCountOfHeartbeatAt);
+  if (!writer || !first || !count) {
+    return std::nullopt;
+  }
+  return HeartbeatOf{*writer, *first, *count};
 }
 
 std::optional<CarriedSample> carried_sample(std::span<const std::uint8_t> datagram) {
@@ -107,11 +128,7 @@ std::optional<CarriedSample> carried_sample(std::span<const std::uint8_t> datagr
     if (part.kind != Submessage::kData && part.kind != Submessage::kDataFragment) {
       return true;
     }
-    const auto writer = entity_at(part, kWriterOfDataAt);
-    const auto number = sequence_number_at(part, kNumberOfDataAt);
-    if (writer && number) {
-      found = CarriedSample{*writer, *number};
-    }
+    found = carried_by(part);
     return false;
   });
   return found;

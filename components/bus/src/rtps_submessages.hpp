@@ -14,6 +14,7 @@ namespace trigpoint::bus {
 /// One of a datagram. What it claims is not checked: `rest` may end before it does.
 struct Submessage {
   static constexpr std::uint8_t kHeartbeat = 0x07;
+  static constexpr std::uint8_t kInfoSource = 0x0C;
   static constexpr std::uint8_t kData = 0x15;
   static constexpr std::uint8_t kDataFragment = 0x16;
 
@@ -24,6 +25,8 @@ struct Submessage {
   /// The four or two bytes at that place after the header's first; nothing beyond the datagram.
   std::optional<std::uint32_t> word_at(std::size_t place) const;
   std::optional<std::uint16_t> half_word_at(std::size_t place) const;
+  /// With its header; never more than the datagram has.
+  std::size_t size() const;
 };
 
 /// Calls `visit` for one after the other until it returns false. What is not RTPS has none.
@@ -38,6 +41,17 @@ struct CarriedSample {
   EntityNumber writer{0};
   std::uint64_t number{0};
 };
+
+/// By a DATA or a DATA_FRAG; nothing where it is cut off.
+std::optional<CarriedSample> carried_by(const Submessage& data);
+
+struct HeartbeatOf {
+  EntityNumber writer{0};
+  std::uint64_t first{0};  ///< of the samples that it still has
+  std::uint32_t count{0};
+};
+
+std::optional<HeartbeatOf> heartbeat_of(const Submessage& heartbeat);
 
 std::optional<CarriedSample> carried_sample(std::span<const std::uint8_t> datagram);
 

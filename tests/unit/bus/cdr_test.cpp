@@ -195,6 +195,27 @@ TYPED_TEST(EveryMessage, does_not_allocate_what_a_hostile_length_asks_for) {
   }
 }
 
+TEST(Cdr, refuses_a_cloud_of_nothing_but_fields_before_it_takes_memory) {
+  constexpr std::uint32_t kFields = 200'000;
+  Bytes bytes{0, 1, 0, 0};
+  const auto append_words = [&bytes](std::initializer_list<std::uint32_t> words) {
+    for (const std::uint32_t word : words) {
+      for (unsigned shift = 0; shift < 32; shift += 8) {
+        bytes.push_back(static_cast<std::uint8_t>(word >> shift));
+      }
+    }
+  };
+  append_words({1, 0, 1, 0, 1, 1, kFields});  // stamp, no frame, height, width
+  for (std::uint32_t i = 0; i < kFields; ++i) {
+    append_words({1, 0, 0, 7, 1});  // no name, offset, datatype, count
+  }
+  append_words({0, 0, 0, 0, 0});
+  reset_largest_allocation();
+  PointCloudMessage cloud;
+  EXPECT_FALSE(decode_cdr(bytes, cloud));
+  EXPECT_LE(largest_allocation(), kSmallAllocations);
+}
+
 TYPED_TEST(EveryMessage, survives_random_bytes) {
   std::mt19937 random(20240607);
   const Bytes whole = encode_cdr(sample<TypeParam>());

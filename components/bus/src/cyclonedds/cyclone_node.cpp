@@ -110,12 +110,12 @@ CycloneNode::CycloneNode(const Config& config, const std::string& name, EventSin
   }
   const std::string what = cannot_join(config);
   dds_domainid_t id{};
-  domain_ = checked(create_domain(config, domain_config(config, buffers), id), what);
   const QosPointer qos(dds_create_qos());
+  set_security(qos.get(), config);  // may throw, so before there is a domain to delete
+  domain_ = checked(create_domain(config, domain_config(config, buffers), id), what);
   dds_qset_entity_name(qos.get(), name.c_str());
   const std::string note = process_note();
   dds_qset_userdata(qos.get(), note.data(), note.size());
-  set_security(qos.get(), config);
   participant_ = dds_create_participant(id, qos.get(), nullptr);
   if (participant_ < 0) {
     dds_delete(domain_);
@@ -188,6 +188,13 @@ void CycloneNode::tell_of_unknown_writer(const std::string& dds_topic) {
   }
 }
 
+void CycloneNode::tell_too_large(std::size_t size_bytes, const Qos& qos) {
+  const std::uint64_t count = ++not_sent_;
+  if (is_told(count)) {
+    tell(too_large_event(size_bytes, qos, count));
+  }
+}
+
 void CycloneNode::tell_not_sent(std::size_t size_bytes, dds_return_t why) {
   const std::uint64_t count = ++not_sent_;
   if (is_told(count)) {
@@ -195,8 +202,7 @@ void CycloneNode::tell_not_sent(std::size_t size_bytes, dds_return_t why) {
           0,
           "bus_sample_not_sent",
           "a sample of " + std::to_string(size_bytes) + " bytes was not sent: Cyclone DDS says '" +
-              dds_strretcode(why) + "'; at most " + std::to_string(kLargestMessage_bytes) +
-              " bytes can be; " + std::to_string(count) + " so far"});
+              dds_strretcode(why) + "'; " + std::to_string(count) + " so far"});
   }
 }
 

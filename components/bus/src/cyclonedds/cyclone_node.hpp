@@ -45,6 +45,7 @@ class CycloneNode : public backend::Node {
 
   void tell(const Event& event) const;
   void tell_of_unknown_writer(const std::string& dds_topic);
+  void tell_too_large(std::size_t size_bytes, const Qos& qos);
   void tell_not_sent(std::size_t size_bytes, dds_return_t why);
 
  private:

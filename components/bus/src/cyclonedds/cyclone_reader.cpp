@@ -4,6 +4,7 @@
 
 #include "../message_info.hpp"
 #include "../reader_events.hpp"
+#include "../rtps_limits.hpp"
 #include "endpoint.hpp"
 
 #include <array>
@@ -119,7 +120,9 @@ void CycloneReader::deliver(const WireData& data, const dds_sample_info_t& info)
     node_.tell_of_unknown_writer(dds_topic_);
     return;
   }
-  if (!type_.deserialize(data.cdr(), message_.get())) {
+  const auto cdr = data.cdr();
+  const bool is_too_large = cdr.size() > static_cast<std::size_t>(largest_message_bytes(qos_));
+  if (is_too_large || !type_.deserialize(cdr, message_.get())) {
     if (const auto event = malformed_event(dds_topic_, told.writer_guid, ++malformed_)) {
       node_.tell(*event);
     }
@@ -210,10 +213,7 @@ void CycloneReader::make_anew_as_best_effort() {
     qos_.reliability = Reliability::kBestEffort;
     reader_ = create();
   } catch (const std::exception& error) {
-    node_.tell({Severity::kError,
-                0,
-                "bus_reader_lost",
-                "nothing on " + dds_topic_ + " is heard any more: " + error.what()});
+    node_.tell(reader_lost_event(dds_topic_, error));
     return;
   }
   update_writers();

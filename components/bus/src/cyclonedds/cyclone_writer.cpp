@@ -2,6 +2,7 @@
 // Copyright the Trigpoint developers
 #include "cyclone_writer.hpp"
 
+#include "../rtps_limits.hpp"
 #include "domain_config.hpp"
 #include "endpoint.hpp"
 
@@ -73,10 +74,15 @@ CycloneWriter::~CycloneWriter() {
 }
 
 bool CycloneWriter::write(const void* value) {
+  const std::size_t size_bytes = type_.size_bound(value);
+  if (size_bytes > static_cast<std::size_t>(largest_message_bytes(qos_))) {
+    node_.tell_too_large(size_bytes, qos_);
+    return false;
+  }
   const WireSample sample{&type_, value};
   const dds_return_t result = send(sample);
-  if (result != DDS_RETCODE_OK && result != DDS_RETCODE_TIMEOUT) {  // too large, say
-    node_.tell_not_sent(type_.size_bound(value), result);
+  if (result != DDS_RETCODE_OK && result != DDS_RETCODE_TIMEOUT) {
+    node_.tell_not_sent(size_bytes, result);
   }
   return result == DDS_RETCODE_OK;
 }

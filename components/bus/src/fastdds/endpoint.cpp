@@ -6,6 +6,13 @@
 
 namespace trigpoint::bus::fastdds {
 
+Guid guid_of(const eprosima::fastrtps::rtps::GUID_t& guid) {
+  Guid bytes{};
+  const auto rest = std::copy_n(guid.guidPrefix.value, sizeof guid.guidPrefix.value, bytes.begin());
+  std::copy_n(guid.entityId.value, sizeof guid.entityId.value, rest);
+  return bytes;
+}
+
 std::string guid_text(const eprosima::fastrtps::rtps::GUID_t& guid) {
   return hexadecimal(guid.guidPrefix.value) + hexadecimal(guid.entityId.value);
 }

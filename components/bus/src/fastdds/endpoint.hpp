@@ -6,6 +6,7 @@
 #include "trigpoint/bus/backend.hpp"
 #include "trigpoint/bus/qos.hpp"
 
+#include "../incoming_samples.hpp"
 #include "../type_hash.hpp"
 #include <fastdds/dds/core/policy/QosPolicies.hpp>
 #include <fastdds/rtps/common/Guid.h>
@@ -38,6 +39,8 @@ void set_policies(EndpointQos& endpoint, const Qos& qos, const backend::TypeOps&
       eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
   endpoint.data_sharing().off();
 }
+
+Guid guid_of(const eprosima::fastrtps::rtps::GUID_t& guid);
 
 /// 32 hexadecimal digits.
 std::string guid_text(const eprosima::fastrtps::rtps::GUID_t& guid);

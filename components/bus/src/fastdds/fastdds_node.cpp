@@ -6,11 +6,14 @@
 
 #include "../network.hpp"
 #include "../process_note.hpp"
+#include "../reader_events.hpp"
+#include "../rtps_limits.hpp"
 #include "bulk_queue.hpp"
 #include "endpoint.hpp"
 #include "fastdds_reader.hpp"
 #include "fastdds_writer.hpp"
 #include "handshake_room.hpp"
+#include "limited_transport.hpp"
 #include "security.hpp"
 #include "transport.hpp"
 #include "wire_type.hpp"
@@ -36,6 +39,16 @@ void turn_off_intraprocess_delivery() {
   eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(settings);
 }
 
+std::function<void(const std::string& sender)> refusal_teller(const EventSink& sink) {
+  const auto count = std::make_shared<std::atomic<std::uint64_t>>(0);
+  return [sink, count](const std::string& sender) {
+    const std::uint64_t so_far = ++*count;
+    if (sink && is_told(so_far)) {
+      sink(fragment_refused_event(sender, so_far));
+    }
+  };
+}
+
 }  // namespace
 
 FastNode::FastNode(const Config& config, const std::string& name, EventSink sink)
@@ -54,7 +67,7 @@ FastNode::FastNode(const Config& config, const std::string& name, EventSink sink
   const std::string note = process_note();
   qos.user_data().data_vec({note.begin(), note.end()});
   bulk_queue_ = make_bulk_queue(config, buffers);
-  set_transport(qos, config, buffers, bulk_queue_);
+  set_transport(qos, config, buffers, bulk_queue_, {incoming_, refusal_teller(sink_)});
   set_security(qos, config);
   const HandshakeRoom room(config);
   const int domain = domain_of(config);
@@ -83,6 +96,7 @@ void FastNode::on_participant_discovery(dds::DomainParticipant*,
   const std::lock_guard lock(discovery_mutex_);
   if (info.status == Info::REMOVED_PARTICIPANT || info.status == Info::DROPPED_PARTICIPANT) {
     processes_.erase(guid);
+    incoming_->remove_participant(info.info.m_guid.guidPrefix.value);
     std::erase_if(endpoints_, [&guid](const auto& each) { return each.first.starts_with(guid); });
   } else if (const auto number = noted_process(info.info.m_userData)) {
     processes_[guid] = *number;
@@ -102,6 +116,9 @@ void FastNode::note_endpoint(bool writes, const Data& data, bool removed) {
   const std::lock_guard lock(discovery_mutex_);
   if (removed) {
     endpoints_.erase(guid);
+    if (writes) {
+      incoming_->remove_writer(guid_of(data.guid()));
+    }
     return;
   }
   DiscoveredEndpoint endpoint{guid, writes, data.topicName().c_str(), data.typeName().c_str()};
@@ -111,6 +128,9 @@ void FastNode::note_endpoint(bool writes, const Data& data, bool removed) {
   endpoint.durability = data.m_qos.m_durability.kind == dds::VOLATILE_DURABILITY_QOS
                             ? Durability::kVolatile
                             : Durability::kTransientLocal;
+  if (writes) {
+    incoming_->add_writer(guid_of(data.guid()), endpoint.dds_topic, endpoint.reliability);
+  }
   endpoints_.insert_or_assign(guid, endpoint);
 }
 
@@ -148,6 +168,13 @@ std::vector<DiscoveredEndpoint> FastNode::discovered() {
 void FastNode::tell(const Event& event) const {
   if (sink_) {
     sink_(event);
+  }
+}
+
+void FastNode::tell_too_large(std::size_t size_bytes, const Qos& qos) {
+  const std::uint64_t count = ++not_sent_;
+  if (is_told(count)) {
+    tell(too_large_event(size_bytes, qos, count));
   }
 }
 

@@ -4,12 +4,14 @@
 
 #include "trigpoint/bus/backend.hpp"
 
+#include "../incoming_samples.hpp"
 #include "../worker.hpp"
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantListener.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 
+#include <atomic>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -48,7 +50,10 @@ class FastNode : public backend::Node, private eprosima::fastdds::dds::DomainPar
   /// Nothing when clouds are not paced, or by Fast DDS.
   BulkQueue* bulk_queue() const { return bulk_queue_.get(); }
 
+  IncomingSamples& incoming() { return *incoming_; }
+
   void tell(const Event& event) const;
+  void tell_too_large(std::size_t size_bytes, const Qos& qos);
 
  private:
   void on_participant_discovery(eprosima::fastdds::dds::DomainParticipant* participant,
@@ -68,6 +73,8 @@ class FastNode : public backend::Node, private eprosima::fastdds::dds::DomainPar
   const EventSink sink_;
   bool is_paced_{false};
   std::shared_ptr<BulkQueue> bulk_queue_;
+  const std::shared_ptr<IncomingSamples> incoming_{std::make_shared<IncomingSamples>()};
+  std::atomic<std::uint64_t> not_sent_{0};
   std::mutex discovery_mutex_;
   std::map<std::string, unsigned> processes_;            ///< by the participant's part of a GUID
   std::map<std::string, DiscoveredEndpoint> endpoints_;  ///< by GUID

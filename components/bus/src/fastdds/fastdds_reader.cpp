@@ -4,6 +4,7 @@
 
 #include "../message_info.hpp"
 #include "../reader_events.hpp"
+#include "../rtps_limits.hpp"
 #include "endpoint.hpp"
 #include "wire_type.hpp"
 
@@ -27,8 +28,14 @@ FastReader::FastReader(FastNode& node,
       events_(std::move(events)),
       message_(type.make()),
       qos_(qos) {
-  const std::lock_guard lock(reader_mutex_);
-  reader_ = create(qos_);
+  node_.incoming().add_reader(topic_->get_name(), qos_);
+  try {
+    const std::lock_guard lock(reader_mutex_);
+    reader_ = create(qos_);
+  } catch (...) {
+    node_.incoming().remove_reader(topic_->get_name(), qos_);
+    throw;
+  }
 }
 
 FastReader::~FastReader() {
@@ -37,12 +44,18 @@ FastReader::~FastReader() {
     closed_ = true;
   }
   node_.worker().cancel(this);
-  remove(reader_);
+  if (reader_ != nullptr) {
+    remove(reader_);
+  }
+  node_.incoming().remove_reader(topic_->get_name(), qos_);
 }
 
 dds::DataReader* FastReader::create(const Qos& qos) {
   dds::DataReaderQos reader_qos;
   set_policies(reader_qos, qos, type_);
+  // Else a reader keeps the largest buffer that any sample has ever needed, for each of its depth.
+  reader_qos.endpoint().history_memory_policy =
+      eprosima::fastrtps::rtps::DYNAMIC_RESERVE_MEMORY_MODE;
   dds::DataReader* reader =
       node_.subscriber().create_datareader(topic_, reader_qos, this, dds::StatusMask::all());
   if (reader == nullptr) {
@@ -61,6 +74,7 @@ void FastReader::on_data_available(dds::DataReader* reader) {
   WireSample sample;
   sample.ops = &type_;
   sample.received = message_.get();
+  sample.largest_bytes = largest_message_bytes(qos_);
   dds::SampleInfo info;
   while (!closed_ && reader->take_next_sample(&sample, &info) ==
                          eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
@@ -116,9 +130,16 @@ void FastReader::on_requested_incompatible_qos(dds::DataReader*,
 
 void FastReader::make_anew_as_best_effort() {
   const std::lock_guard lock(reader_mutex_);
-  remove(reader_);
-  qos_.reliability = Reliability::kBestEffort;
-  reader_ = create(qos_);
+  try {
+    remove(std::exchange(reader_, nullptr));
+    node_.incoming().remove_reader(topic_->get_name(), qos_);
+    qos_.reliability = Reliability::kBestEffort;
+    node_.incoming().add_reader(topic_->get_name(), qos_);
+    reader_ = create(qos_);
+  } catch (const std::exception& error) {
+    node_.tell(reader_lost_event(topic_->get_name(), error));
+    return;
+  }
   node_.tell(best_effort_event(topic_->get_name()));
 }
 

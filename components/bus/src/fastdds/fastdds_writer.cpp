@@ -2,6 +2,7 @@
 // Copyright the Trigpoint developers
 #include "fastdds_writer.hpp"
 
+#include "../rtps_limits.hpp"
 #include "bulk_queue.hpp"
 #include "endpoint.hpp"
 #include "transport.hpp"
@@ -71,7 +72,7 @@ FastWriter::FastWriter(FastNode& node,
                        dds::Topic* topic,
                        const Qos& qos,
                        PublisherEvents events)
-    : node_(node), type_(type), events_(std::move(events)) {
+    : node_(node), type_(type), qos_(qos), events_(std::move(events)) {
   writer_ = node.publisher().create_datawriter(
       topic, writer_qos(node, qos, type), this, dds::StatusMask::all());
   if (writer_ == nullptr) {
@@ -104,6 +105,11 @@ FastWriter::~FastWriter() {
 }
 
 bool FastWriter::write(const void* value) {
+  const std::size_t size_bytes = type_.size_bound(value);
+  if (size_bytes > static_cast<std::size_t>(largest_message_bytes(qos_))) {
+    node_.tell_too_large(size_bytes, qos_);
+    return false;
+  }
   WireSample sample;
   sample.ops = &type_;
   sample.written = value;

@@ -35,6 +35,7 @@ class FastWriter : public backend::Writer, private eprosima::fastdds::dds::DataW
 
   FastNode& node_;
   const backend::TypeOps type_;
+  const Qos qos_;
   const PublisherEvents events_;
   std::mutex callback_mutex_;
   bool closed_{false};

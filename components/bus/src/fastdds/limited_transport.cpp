@@ -2,14 +2,16 @@
 // Copyright the Trigpoint developers
 #include "limited_transport.hpp"
 
-#include "../rtps_limits.hpp"
+#include "../incoming_samples.hpp"
 #include "bulk_queue.hpp"
 #include "channels.hpp"
 #include <fastdds/rtps/common/LocatorList.hpp>
 #include <fastdds/rtps/network/SenderResource.h>
 #include <fastdds/rtps/transport/ChainingTransport.h>
 #include <fastdds/rtps/transport/TransportReceiverInterface.h>
+#include <fastrtps/utils/IPLocator.h>
 
+#include <chrono>
 #include <utility>
 
 namespace trigpoint::bus::fastdds {
@@ -17,6 +19,7 @@ namespace trigpoint::bus::fastdds {
 namespace {
 
 namespace rtps = eprosima::fastdds::rtps;
+using eprosima::fastrtps::rtps::IPLocator;
 using eprosima::fastrtps::rtps::Locator_t;
 using eprosima::fastrtps::rtps::LocatorsIterator;
 using eprosima::fastrtps::rtps::octet;
@@ -25,10 +28,12 @@ using eprosima::fastrtps::rtps::SenderResource;
 class LimitedTransport : public rtps::ChainingTransport {
  public:
   LimitedTransport(const rtps::ChainingTransportDescriptor& descriptor,
-                   std::shared_ptr<BulkQueue> bulk)
+                   std::shared_ptr<BulkQueue> bulk,
+                   Incoming incoming)
       : ChainingTransport(descriptor),
         low_level_descriptor_(descriptor.low_level_descriptor),
-        bulk_(std::move(bulk)) {}
+        bulk_(std::move(bulk)),
+        incoming_(std::move(incoming)) {}
 
   rtps::TransportDescriptorInterface* get_configuration() override {
     return low_level_descriptor_.get();
@@ -66,36 +71,46 @@ class LimitedTransport : public rtps::ChainingTransport {
                std::uint32_t size,
                const Locator_t& local,
                const Locator_t& remote) override {
-    if (!announces_more_than({bytes, size}, kLargestMessage_bytes)) {
+    const auto verdict = incoming_.samples->judge({bytes, size}, std::chrono::steady_clock::now());
+    if (verdict.passes()) {
       next->OnDataReceived(bytes, size, local, remote);
+    } else if (verdict.is_refused) {
+      incoming_.refused(IPLocator::ip_to_string(remote));
     }
   }
 
  private:
   std::shared_ptr<rtps::TransportDescriptorInterface> low_level_descriptor_;
   std::shared_ptr<BulkQueue> bulk_;
+  const Incoming incoming_;
   Channels channels_;
 };
 
 struct LimitedDescriptor : rtps::ChainingTransportDescriptor {
   LimitedDescriptor(std::shared_ptr<rtps::TransportDescriptorInterface> low_level,
-                    std::shared_ptr<BulkQueue> bulk)
-      : ChainingTransportDescriptor(std::move(low_level)), bulk_(std::move(bulk)) {}
+                    std::shared_ptr<BulkQueue> bulk,
+                    Incoming incoming)
+      : ChainingTransportDescriptor(std::move(low_level)),
+        bulk_(std::move(bulk)),
+        incoming_(std::move(incoming)) {}
 
   rtps::TransportInterface* create_transport() const override {
-    return new LimitedTransport(*this, bulk_);  // Fast DDS owns it
+    return new LimitedTransport(*this, bulk_, incoming_);  // Fast DDS owns it
   }
 
  private:
   std::shared_ptr<BulkQueue> bulk_;
+  Incoming incoming_;
 };
 
 }  // namespace
 
 std::shared_ptr<rtps::TransportDescriptorInterface> limited(
     std::shared_ptr<rtps::TransportDescriptorInterface> transport,
-    std::shared_ptr<BulkQueue> bulk) {
-  return std::make_shared<LimitedDescriptor>(std::move(transport), std::move(bulk));
+    std::shared_ptr<BulkQueue> bulk,
+    Incoming incoming) {
+  return std::make_shared<LimitedDescriptor>(
+      std::move(transport), std::move(bulk), std::move(incoming));
 }
 
 }  // namespace trigpoint::bus::fastdds

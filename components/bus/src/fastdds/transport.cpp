@@ -128,7 +128,8 @@ std::shared_ptr<BulkQueue> make_bulk_queue(const Config& config, const SocketBuf
 void set_transport(eprosima::fastdds::dds::DomainParticipantQos& qos,
                    const Config& config,
                    const SocketBuffers& buffers,
-                   const std::shared_ptr<BulkQueue>& bulk) {
+                   const std::shared_ptr<BulkQueue>& bulk,
+                   const Incoming& incoming) {
   auto udp = std::make_shared<Udp>();
   udp->largest_sent_bytes = static_cast<std::uint32_t>(config.datagram_bytes);
   udp->sendBufferSize = static_cast<std::uint32_t>(buffers.send_bytes);
@@ -143,7 +144,7 @@ void set_transport(eprosima::fastdds::dds::DomainParticipantQos& qos,
   // Shared memory stays off unless asked for: it costs seconds of reconnection after a kill and
   // never matches between root and other users (see the README).
   qos.transport().use_builtin_transports = false;
-  qos.transport().user_transports.push_back(limited(udp, bulk));
+  qos.transport().user_transports.push_back(limited(udp, bulk, incoming));
   if (config.shared_memory) {
     qos.transport().user_transports.push_back(shared_memory());
   }

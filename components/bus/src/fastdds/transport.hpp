@@ -13,6 +13,7 @@
 namespace trigpoint::bus::fastdds {
 
 class BulkQueue;
+struct Incoming;
 
 /// Name of the flow controller of bulk writers; there is one only when pacing_of() says so and
 /// there is no queue of ours.
@@ -27,6 +28,7 @@ std::shared_ptr<BulkQueue> make_bulk_queue(const Config& config, const SocketBuf
 void set_transport(eprosima::fastdds::dds::DomainParticipantQos& qos,
                    const Config& config,
                    const SocketBuffers& buffers,
-                   const std::shared_ptr<BulkQueue>& bulk);
+                   const std::shared_ptr<BulkQueue>& bulk,
+                   const Incoming& incoming);
 
 }  // namespace trigpoint::bus::fastdds

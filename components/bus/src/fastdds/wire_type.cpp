@@ -29,8 +29,8 @@ bool WireType::serialize(void* sample, eprosima::fastrtps::rtps::SerializedPaylo
 /// Always true: a malformed sample is consumed, and told by `decoded`.
 bool WireType::deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* sample) {
   auto& wire = *static_cast<WireSample*>(sample);
-  wire.decoded =
-      wire.ops != nullptr && wire.ops->deserialize({payload->data, payload->length}, wire.received);
+  wire.decoded = wire.ops != nullptr && std::int64_t{payload->length} <= wire.largest_bytes &&
+                 wire.ops->deserialize({payload->data, payload->length}, wire.received);
   return true;
 }
 

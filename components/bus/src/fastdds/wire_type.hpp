@@ -13,9 +13,10 @@ namespace trigpoint::bus::fastdds {
 /// share one registered type.
 struct WireSample {
   const backend::TypeOps* ops{nullptr};
-  const void* written{nullptr};  ///< in: the message to serialise
-  void* received{nullptr};       ///< in: where to put the message
-  bool decoded{false};           ///< out
+  const void* written{nullptr};   ///< in: the message to serialise
+  void* received{nullptr};        ///< in: where to put the message
+  std::int64_t largest_bytes{0};  ///< in: of a message that is decoded at all
+  bool decoded{false};            ///< out
 };
 
 class WireType : public eprosima::fastdds::dds::TopicDataType {
