@@ -57,11 +57,11 @@ bool ClockOffset::is_known(Nanoseconds difference_ns) const {
 /// A fix that is merely late has stamps that go on; only a clock goes back, or is off by more than
 /// any link is slow.
 bool ClockOffset::is_other_clock(Nanoseconds stamp_ns, Nanoseconds difference_ns) const {
-  if (is_estimated_ || difference_ns > future_limit_ns_ || difference_ns < -latest_ns_ ||
-      !candidates_.empty()) {
+  if (is_estimated_ || difference_ns > future_limit_ns_ || difference_ns < -latest_ns_) {
     return true;
   }
-  return newest_stamp_ns_ && stamp_ns < *newest_stamp_ns_ - kStep_ns && !fills_gap(stamp_ns);
+  const bool went_back = newest_stamp_ns_ && stamp_ns < *newest_stamp_ns_ - kStep_ns;
+  return (went_back || !candidates_.empty()) && !fills_gap(stamp_ns);
 }
 
 /// A fix that was overtaken is missing among those that came. The stamps of a clock that went back

@@ -298,6 +298,8 @@ TEST(ClockOffset, takes_a_fix_that_fills_a_gap_for_late_and_not_for_another_cloc
   EXPECT_EQ(clocks.offset.place(stamp_of(20.0), stamp_of(21.2)).stamp_ns, stamp_of(20.0));
   EXPECT_EQ(was_there.place(stamp_of(19.8), stamp_of(21.2)).reason, "clock_jump");
   EXPECT_EQ(between.place(stamp_of(19.9), stamp_of(21.2)).reason, "clock_jump");
+  // A copy that comes as late does not make one of it.
+  EXPECT_EQ(was_there.place(stamp_of(20.0), stamp_of(21.25)).stamp_ns, stamp_of(20.0));
 }
 
 INSTANTIATE_TEST_SUITE_P(Filters, Clock, testing::Values("ekf15", "eskf18"));
