@@ -144,6 +144,27 @@ TEST(Doctor, finds_nothing_wrong_where_nothing_is) {
                     Not(HasSubstr("trigpoint (process"))));
 }
 
+TEST(Doctor, takes_two_gps_filters_of_which_one_lags_for_no_fault) {
+  Config config = testing::own_domain();
+  config.network_interface.clear();
+  Participant first(config, "first");
+  Participant second(config, "second");
+  Publisher one(first, topics::gps_odometry);
+  Publisher other(second, topics::gps_odometry);
+  const Publishing publishing([&](Nanoseconds now_ns) {
+    Odometry odometry;
+    odometry.stamp_ns = now_ns;
+    odometry.frame_id = "map";
+    odometry.child_frame_id = "base_link";
+    odometry.pose_covariance = PoseCovariance::Identity() * 0.01;
+    one.publish(to_message(odometry));
+    odometry.stamp_ns = now_ns - 50'000'000;
+    other.publish(to_message(odometry));
+  });
+  const auto result = doctor(config);
+  EXPECT_THAT(result.output, AllOf(HasSubstr("writes gps/odometry"), Not(HasSubstr("goes back"))));
+}
+
 /// The rate is the sensor's, not that of a window in which nobody was heard for half of the time.
 TEST(BusSurvey, measures_the_rate_since_the_first_message) {
   constexpr double kSurvey_s = 5.0;

@@ -8,6 +8,7 @@
 
 #include "measurement_checks.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <map>
 #include <memory>
@@ -26,7 +27,7 @@ double seconds_between(Clock::time_point from, Clock::time_point to) {
 class Listener {
  public:
   Listener(bus::Participant& participant, bus::Loop& loop, const KnownTopic& topic)
-      : checks_(topic.from_sensor ? MeasurementChecks::Origin::kSensor
+      : origin_(topic.from_sensor ? MeasurementChecks::Origin::kSensor
                                   : MeasurementChecks::Origin::kOurs),
         subscription_(participant,
                       topic.name,
@@ -69,7 +70,14 @@ class Listener {
     if (without_track_since_) {
       survey_.without_track_s = seconds_between(*without_track_since_, now);
     }
-    survey_.remarks = checks_.remarks();
+    for (const auto& [writer, checks] : checks_) {
+      for (const std::string& remark : checks.remarks()) {
+        if (std::find(survey_.remarks.begin(), survey_.remarks.end(), remark) ==
+            survey_.remarks.end()) {
+          survey_.remarks.push_back(remark);
+        }
+      }
+    }
     return survey_;
   }
 
@@ -109,38 +117,39 @@ class Listener {
       remember(status);
       return;
     }
-    check<ImuSample>(bytes) || check<GnssFix>(bytes) || check<PointCloudMessage>(bytes) ||
-        check<Odometry>(bytes);
+    MeasurementChecks& checks = checks_.try_emplace(writer, origin_).first->second;
+    check<ImuSample>(bytes, checks) || check<GnssFix>(bytes, checks) ||
+        check<PointCloudMessage>(bytes, checks) || check<Odometry>(bytes, checks);
   }
 
   template <typename Plain>
-  bool check(const bus::SerializedMessage& bytes) {
+  bool check(const bus::SerializedMessage& bytes, MeasurementChecks& checks) {
     if (survey_.topic.ros_type != bus::ros_type_name<Plain>()) {
       return false;
     }
     Plain value;
     if (bus::decode_cdr(bytes, value)) {
-      checks_.take(value);
-      remember(value);
+      checks.take(value);
+      remember(value, checks);
     } else {
-      checks_.note("a message could not be decoded as " + survey_.topic.ros_type);
+      checks.note("a message could not be decoded as " + survey_.topic.ros_type);
     }
     return true;
   }
 
-  void remember(const GnssFix& fix) { survey_.last_fix = fix; }
+  void remember(const GnssFix& fix, MeasurementChecks&) { survey_.last_fix = fix; }
 
-  void remember(const Odometry& odometry) {
+  void remember(const Odometry& odometry, MeasurementChecks& checks) {
     const std::string& topic = survey_.topic.name;
     if (topic == "gps/odometry" && odometry.pose_covariance.isZero(0.0)) {
-      checks_.note(
+      checks.note(
           "the pose has a covariance of 0, as if it were perfect: what is not known is 1e6");
     }
     const std::string frame = topic.starts_with("lio/")      ? "odom"
                               : topic.starts_with("fusion/") ? "map"
                                                              : odometry.frame_id;
     if (odometry.frame_id != frame) {
-      checks_.note("frame_id is '" + odometry.frame_id + "', expected is '" + frame + "'");
+      checks.note("frame_id is '" + odometry.frame_id + "', expected is '" + frame + "'");
     }
   }
 
@@ -155,14 +164,16 @@ class Listener {
   }
 
   template <typename Plain>
-  void remember(const Plain&) {}
+  void remember(const Plain&, MeasurementChecks&) {}
 
   TopicSurvey survey_;
   std::map<std::string, Clock::time_point> newest_;  ///< message by writer, or when it was found
   std::optional<Clock::time_point> found_;           ///< the first writer
   std::optional<Clock::time_point> first_heard_;     ///< the first message of anybody
   std::optional<Clock::time_point> without_track_since_;
-  MeasurementChecks checks_;
+  MeasurementChecks::Origin origin_;
+  /// By writer: two GPS filters, of which each goes on in its own time, are no fault.
+  std::map<std::string, MeasurementChecks> checks_;
   bus::SerializedSubscription subscription_;
 };
 

@@ -15,6 +15,12 @@ namespace trigpoint::bus::fastdds {
 
 namespace dds = eprosima::fastdds::dds;
 
+namespace {
+
+constexpr int kMostAtOnce = 10'000;  // samples that are taken in one callback
+
+}  // namespace
+
 FastReader::FastReader(FastNode& node,
                        const backend::TypeOps& type,
                        dds::Topic* topic,
@@ -53,9 +59,6 @@ FastReader::~FastReader() {
 dds::DataReader* FastReader::create(const Qos& qos) {
   dds::DataReaderQos reader_qos;
   set_policies(reader_qos, qos, type_);
-  // Else a reader keeps the largest buffer that any sample has ever needed, for each of its depth.
-  reader_qos.endpoint().history_memory_policy =
-      eprosima::fastrtps::rtps::DYNAMIC_RESERVE_MEMORY_MODE;
   dds::DataReader* reader =
       node_.subscriber().create_datareader(topic_, reader_qos, this, dds::StatusMask::all());
   if (reader == nullptr) {
@@ -76,8 +79,13 @@ void FastReader::on_data_available(dds::DataReader* reader) {
   sample.received = message_.get();
   sample.largest_bytes = largest_message_bytes(qos_);
   dds::SampleInfo info;
-  while (!closed_ && reader->take_next_sample(&sample, &info) ==
-                         eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
+  // More than any history holds is one sample again and again, which Fast DDS cannot remove: to go
+  // on would keep its thread, and whoever deletes the reader, for ever.
+  for (int taken = 0; taken < kMostAtOnce && !closed_; ++taken) {
+    if (reader->take_next_sample(&sample, &info) !=
+        eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
+      return;
+    }
     if (info.valid_data) {
       deliver(info, sample.decoded);
     }
