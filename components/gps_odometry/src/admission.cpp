@@ -65,9 +65,12 @@ std::optional<Refusal> Admission::check_order(const CheckedFix& fix, const Filte
                        std::to_string(to_seconds(fix.stamp_ns)) + " s already."};
   }
   if (filter.is_too_old(fix.stamp_ns)) {
-    return Refusal{"too_old",
-                   "Fix refused: it is " + std::to_string(to_seconds(*imu_ns - fix.stamp_ns)) +
-                       " s old, expected at most " + std::to_string(rewind_s_) + " s."};
+    const double age_s = to_seconds(*imu_ns - fix.stamp_ns);
+    return Refusal{
+        "too_old",
+        "Fix refused: it is " + std::to_string(age_s) + " s old, " +
+            (age_s > rewind_s_ ? "expected at most " + std::to_string(rewind_s_) + " s."
+                               : "from before the state to which the filter can go back.")};
   }
   if (fix.stamp_ns > *imu_ns + future_limit_ns_) {
     fixes_ahead_ = fix.stamp_ns > newest_ahead_ns_ ? fixes_ahead_ + 1 : 1;

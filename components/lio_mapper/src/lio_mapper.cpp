@@ -346,12 +346,15 @@ void LioMapper::Impl::count_row(const StateUpdate& update,
     ++status.rows_refused;
     status.last_refusal =
         verdict.reason + " (fix of " + std::to_string(update.fix_stamp_ns) + " ns)";
-    output.events.push_back({Severity::kWarning,
-                             update.fix_stamp_ns,
-                             "row_refused_" + verdict.reason,
-                             "refused the GPS row of a fix " +
-                                 seconds_text(status.stamp_ns - update.fix_stamp_ns) +
-                                 " before the newest scan: " + verdict.reason});
+    output.events.push_back(
+        {Severity::kWarning,
+         update.fix_stamp_ns,
+         "row_refused_" + verdict.reason,
+         "refused the GPS row of a fix " +
+             (status.scans_used == 0 ? "before the first scan"
+                                     : seconds_text(status.stamp_ns - update.fix_stamp_ns) +
+                                           " before the newest scan") +
+             ": " + verdict.reason});
   }
 }
 
