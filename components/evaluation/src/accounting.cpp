@@ -85,6 +85,7 @@ std::string of(std::uint64_t part, std::uint64_t whole, const std::string& strea
 /// Sentences about messages that went missing, and about those that were refused with a reason.
 struct Findings {
   std::vector<std::string> losses;
+  std::vector<std::string> surplus;
   std::vector<std::string> refusals;
 };
 
@@ -133,6 +134,9 @@ void find_losses(const ProgramCounts& program,
   const auto received = counts.get("received");
   if (received && sent && *received != *sent) {
     findings.losses.push_back(program.program + " received " + of(*received, *sent, stream));
+    if (*received > *sent) {
+      findings.surplus.push_back(findings.losses.back());
+    }
   }
   find_verdictless(program.program, stream, counts, sent, findings);
   const auto used = counts.get("used");
@@ -218,7 +222,7 @@ Accounting account(const SessionData& data) {
     }
   }
   find_missing_counts(data, findings);
-  return {counted, findings.losses, findings.refusals};
+  return {counted, findings.losses, findings.surplus, findings.refusals};
 }
 
 namespace {
@@ -227,6 +231,7 @@ std::string conclude(const SessionData& data, const Accounting& found) {
   if (!found.losses.empty()) {
     return std::string("\nNOT ALL ACCOUNTED FOR") +
            (data.interrupted()       ? ", because the run was interrupted by the user"
+            : !found.surplus.empty() ? ", because somebody else published into the drive"
             : !data.restarts.empty() ? ", because processes were down for a while (see Restarts)"
                                      : "") +
            ":\n\n" + list_of(found.losses) + list_of(found.refusals);

@@ -131,8 +131,12 @@ std::vector<std::string> find_failures(const SessionData& data,
   if (std::string lost = lost_end(data, missed); !lost.empty() && !data.interrupted()) {
     failures.push_back(std::move(lost));
   }
-  // What was on its way while a process was down is listed under Restarts.
-  if (!found.losses.empty() && !data.interrupted() && data.restarts.empty()) {
+  // What was on its way while a process was down is listed under Restarts; no restart brings more.
+  if (!found.surplus.empty() && !data.interrupted()) {
+    failures.push_back("More came than the drive published: " + found.surplus.front() +
+                       (found.surplus.size() > 1 ? ", and more (see Messages)." : ".") +
+                       " Somebody else published it, too.");
+  } else if (!found.losses.empty() && !data.interrupted() && data.restarts.empty()) {
     failures.push_back("Not all messages are accounted for: " + found.losses.front() +
                        (found.losses.size() > 1 ? ", and more (see Messages)." : "."));
   }

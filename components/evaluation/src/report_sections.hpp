@@ -21,6 +21,7 @@ std::string print_map(const SessionData& data, const SessionMap& map);
 struct Accounting {
   bool counted{false};  ///< somebody counted what was published
   std::vector<std::string> losses;
+  std::vector<std::string> surplus;  ///< of the losses: more came than was published
   std::vector<std::string> refusals;
 };
 

@@ -401,6 +401,10 @@ TEST(Report,
                     HasSubstr("given up"),
                     HasSubstr("Scans missed: 0, by their usual interval"),
                     HasSubstr("NOT ALL ACCOUNTED FOR, because processes were down")));
+  exporter::CountsWriter(folder.path(), "lio_mapper")
+      .write({{"points.received", 1200}, {"points.used", 1200}, {"imu.received", 99'000}});
+  EXPECT_THAT(write_report(folder.path(), kNoPictures).failures,
+              Contains(HasSubstr("More came than the drive published: lio_mapper received 99000")));
   write_all(folder.file("restarts.csv"), "unix_s,program,restarted,lived_s,what\nnonsense\n");
   EXPECT_THAT(write_report(folder.path(), kNoPictures).problems,
               Contains(HasSubstr("restarts.csv:2")));
