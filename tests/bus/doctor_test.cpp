@@ -206,6 +206,41 @@ TEST(BusSurvey, measures_the_rate_since_the_first_message) {
   EXPECT_GT(surveys.front().rate_hz, kAtLeast * published / spoken.count());
 }
 
+TEST(BusSurvey, tells_a_successor_from_a_second_writer) {
+  const Config config = testing::own_domain();
+  recording::SurveyOptions options;
+  options.bus = config;
+  options.topics = {
+      {std::string(topics::imu.name), ros_type_name<ImuSample>(), topics::imu.qos, true}};
+  Participant others(config, "others");
+  const auto speak = [](Publisher<sensor_msgs::msg::Imu>& imu, Nanoseconds now_ns) {
+    imu.publish(to_message(imu_at_rest(now_ns, 9.81, 0.5)));
+  };
+  {
+    Publisher one(others, topics::imu);
+    Publisher two(others, topics::imu);
+    const Publishing both([&](Nanoseconds now_ns) {
+      speak(one, now_ns);
+      speak(two, now_ns);
+    });
+    const auto together = recording::survey_bus(options).front();
+    EXPECT_EQ(together.writers.size(), 2U);
+    EXPECT_TRUE(together.predecessors.empty());
+  }
+  options.duration_s = 8.0;
+  std::vector<recording::TopicSurvey> surveys;
+  std::thread listening([&] { surveys = recording::survey_bus(options); });
+  const auto speak_for = [&](auto until) {
+    Publisher imu(others, topics::imu);
+    const Publishing publishing([&](Nanoseconds now_ns) { speak(imu, now_ns); });
+    until();
+  };
+  speak_for([] { std::this_thread::sleep_for(4s); });
+  speak_for([&] { listening.join(); });
+  EXPECT_EQ(surveys.front().writers.size(), 2U);
+  EXPECT_EQ(surveys.front().predecessors.size(), 1U);
+}
+
 // ---- programs that say nothing ------------------------------------------------------------------
 
 /// As a mapper that is busy with one long piece of work: found, and silent on all its topics.

@@ -175,7 +175,9 @@ std::vector<Finding> several_writers(const std::vector<TopicSurvey>& surveys) {
       "gps/odometry", "gps/status", "datum", "tf", "tf_static", "diagnostics", "clock_probe"};
   std::vector<Finding> found;
   for (const TopicSurvey& survey : surveys) {
-    const std::size_t writers = survey.writers.size() + survey.silent_writers.size();
+    // One that was killed is held to be there until its lease runs out.
+    const std::size_t writers =
+        survey.writers.size() + survey.silent_writers.size() - survey.predecessors.size();
     if (writers > 1 && !kForMany.contains(survey.topic.name)) {
       found.push_back({survey.topic.name,
                        std::to_string(writers) +

@@ -61,6 +61,12 @@ class Listener {
       survey_.rate_hz = static_cast<double>(survey_.messages - 1) / survey_.heard_s;
     }
     for (const auto& [writer, newest] : newest_) {
+      if (survey_.writers.contains(writer) &&
+          std::any_of(came_.begin(), came_.end(), [at = newest](const auto& other) {
+            return other.second > at;
+          })) {
+        survey_.predecessors.insert(writer);
+      }
       survey_.silent_s[writer] = seconds_between(newest, now);
       if (!survey_.writers.contains(writer)) {
         survey_.silent_writers.insert(writer);
@@ -85,6 +91,7 @@ class Listener {
   void find(const std::string& writer, bus::Participant& participant) {
     const Clock::time_point now = Clock::now();
     newest_.emplace(writer, now);
+    came_.emplace(writer, now);
     if (!found_) {
       found_ = now;
     }
@@ -110,6 +117,7 @@ class Listener {
     survey_.writers.insert(writer);
     const Clock::time_point now = Clock::now();
     newest_[writer] = now;
+    came_.emplace(writer, now);
     first_heard_ = first_heard_.value_or(now);
     LioStatus status;
     if (survey_.topic.ros_type == bus::ros_type_name<LioStatus>() &&
@@ -168,6 +176,7 @@ class Listener {
 
   TopicSurvey survey_;
   std::map<std::string, Clock::time_point> newest_;  ///< message by writer, or when it was found
+  std::map<std::string, Clock::time_point> came_;    ///< when a writer was found, or first heard
   std::optional<Clock::time_point> found_;           ///< the first writer
   std::optional<Clock::time_point> first_heard_;     ///< the first message of anybody
   std::optional<Clock::time_point> without_track_since_;

@@ -29,6 +29,7 @@ struct TopicSurvey {
   std::uint64_t bytes{0};
   std::set<std::string> writers;              ///< GUIDs of those who were heard
   std::set<std::string> silent_writers;       ///< matched, but nothing came from them
+  std::set<std::string> predecessors;         ///< of those heard: silent since before another came
   std::map<std::string, unsigned> processes;  ///< numbers of the writers' processes, where told
   std::set<std::string> refused;              ///< QoS policies for which a writer did not match
   std::vector<std::string> remarks;           ///< wrong units, missing fields, frames: sentences

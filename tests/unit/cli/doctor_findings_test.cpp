@@ -93,6 +93,9 @@ TEST(DoctorFindings, name_topics_with_several_writers_but_for_gps_filters) {
   EXPECT_THAT(several_writers({gate, filters}), IsEmpty());
   gate.silent_writers = filters.silent_writers = {"b"};
   EXPECT_THAT(several_writers({gate, filters}), one("fusion/odometry", "2 writers"));
+  // One that was killed while doctor listened, and its successor, were never there together.
+  gate.predecessors = {*gate.writers.begin()};
+  EXPECT_THAT(several_writers({gate, filters}), IsEmpty());
 }
 
 TEST(DoctorFindings, tell_swapped_coordinates_and_another_site_by_the_datum) {
