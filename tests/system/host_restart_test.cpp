@@ -118,7 +118,8 @@ TEST_F(HostRestart, of_one_process_is_counted_in_words) {
   ASSERT_TRUE(comes_true([&] { return lives_of(program) == 2; })) << running->output_so_far();
   running->signal(SIGTERM);
   const CommandResult result = running->wait(kForever);
-  EXPECT_EQ(result.exit_code, 0) << result.output;
+  EXPECT_EQ(result.exit_code, 0) << result.output
+                                 << read_file(part_ + "/logs/trigpoint_clock_watch.log");
   EXPECT_THAT(result.output, HasSubstr("bringup/host: a process failed once; see " + part_));
 }
 
