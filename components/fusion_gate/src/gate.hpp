@@ -116,8 +116,7 @@ struct FusionGate::Impl {
   void remember_gps(const Odometry& gps_in_map);
   bool gps_dead_reckons() const;
   Eigen::Vector3d gps_velocity_error_mps() const;
-  std::optional<Pose> as_gps_moved(const Odometry& base) const;
-  Pose taken_over_by_gps(const Odometry& base);
+  Pose as_gps_moved(const Odometry& base, const Pose& predicted) const;
 
   // --- status
   FusionStatus status() const;

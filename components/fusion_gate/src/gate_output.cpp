@@ -180,7 +180,8 @@ void FusionGate::Impl::publish_gps(Output& out) {
       unchanged.p -= to_seconds(base.stamp_ns - last_raw->stamp_ns) * gps_error_map_mps;
     }
   } else if (last_carrier == Carrier::kLio) {
-    unchanged = taken_over_by_gps(base);
+    gps_error_map_mps = gps_velocity_error_mps();
+    unchanged = as_gps_moved(base, predicted);
   } else {
     gps_error_map_mps.setZero();
   }
@@ -228,14 +229,14 @@ Eigen::Vector3d FusionGate::Impl::gps_velocity_error_mps() const {
 }
 
 /// From the last raw pose as the GPS filter has moved since: through turns and stops that nobody
-/// foresees. nullopt where it was not heard then, knows no heading, or moved as no robot does.
-std::optional<Pose> FusionGate::Impl::as_gps_moved(const Odometry& base) const {
+/// foresees. `predicted` where it was not heard then, knows no heading, or moved as no robot does.
+Pose FusionGate::Impl::as_gps_moved(const Odometry& base, const Pose& predicted) const {
   if (!last_raw || !knows_heading(base)) {
-    return std::nullopt;
+    return predicted;
   }
   const PoseBuffer::Answer before = gps_poses.at(last_raw->stamp_ns);
   if (before.coverage != PoseBuffer::Coverage::kCovered) {
-    return std::nullopt;
+    return predicted;
   }
   const double dt_s = to_seconds(base.stamp_ns - last_raw->stamp_ns);
   const Pose& last = last_raw->T_frame_child;
@@ -243,14 +244,8 @@ std::optional<Pose> FusionGate::Impl::as_gps_moved(const Odometry& base) const {
   const Eigen::Vector3d gps_moved_m = base.T_frame_child.p - before.sample.T_frame_child.p;
   const Pose moved{(R_map_gps * base.T_frame_child.q).normalized(),
                    last.p + R_map_gps * gps_moved_m - dt_s * gps_error_map_mps};
-  const double beside_m = (moved.p - as_predicted(base.stamp_ns, moved).p).norm();
-  return beside_m <= kGpsStep_m + 0.5 * kHardestChange_mps2 * dt_s * dt_s ? std::optional(moved)
-                                                                          : std::nullopt;
-}
-
-Pose FusionGate::Impl::taken_over_by_gps(const Odometry& base) {
-  gps_error_map_mps = gps_velocity_error_mps();
-  return as_gps_moved(base).value_or(as_predicted(base.stamp_ns, base.T_frame_child));
+  const double beside_m = (moved.p - predicted.p).norm();
+  return beside_m <= kGpsStep_m + 0.5 * kHardestChange_mps2 * dt_s * dt_s ? moved : predicted;
 }
 
 /// LIO finds the robot elsewhere than it went when surfaces come into sight along an axis where
