@@ -262,11 +262,6 @@ void describe(Config& config, ConfigFields& fields) {
                             "share of the pose's covariance relative to the local map that new map "
                             "inherits, per metre",
                             kNotNegative);
-                   f.number("roughness_per_m",
-                            config.drift.roughness_per_m,
-                            "share of the variance of the map's points across their planes that "
-                            "position gathers, per metre: foliage is rougher than walls",
-                            kNotNegative);
                    f.number("blind_tilt_rad_sqrts",
                             config.drift.blind_tilt_rad_sqrts,
                             "sigma of roll and of pitch against gravity after one second, while "

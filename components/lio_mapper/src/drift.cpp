@@ -16,12 +16,8 @@ namespace {
 
 /// What is larger stays the same error for long, as in a tunnel, and is the pose's own: passed on
 /// every metre it would leave the pose nothing to learn from GPS.
-constexpr double kMostInherited_m = 0.1;
-constexpr double kMostInherited_rad = 0.01;
-/// Planes as thin as this are as thin as range noise lets them be, ...
-constexpr double kSmooth_m = 0.01;
-/// ... and what a thicker one displaces at this distance turns the pose.
-constexpr double kLever_m = 10.0;
+constexpr double kMostInherited_m = 0.03;
+constexpr double kMostInherited_rad = 0.003;
 /// One scan that leaves the position more open than this does not hold the velocity.
 constexpr double kHeld_m = 0.3;
 
@@ -42,7 +38,7 @@ void add_tilt_noise(const Eigen::Matrix2d& tilt_rad2,
 
 }  // namespace
 
-DriftRate drift_rate(const DriftConfig& drift, const Matrix6d& local, double roughness2_m2) {
+DriftRate drift_rate(const DriftConfig& drift, const Matrix6d& local) {
   const double inherited = drift.map_renewal_per_m;
   const auto square = [](double x) { return x * x; };
   const Eigen::SelfAdjointEigenSolver<Matrix3d> axes(local.topLeftCorner<3, 3>());
@@ -52,16 +48,13 @@ DriftRate drift_rate(const DriftConfig& drift, const Matrix6d& local, double rou
       axes.eigenvectors().transpose();
   const double most_rad2 = square(kMostInherited_rad);
   DriftRate rate;
-  const double rough_m2 = drift.roughness_per_m * std::max(0.0, roughness2_m2 - square(kSmooth_m));
-  const double everywhere_m2 = square(drift.position_sigma_m_sqrtm) + rough_m2;
-  rate.position_m2 = everywhere_m2 * Matrix3d::Identity() + inherited * position_m2;
-  const double rough_rad2 = rough_m2 / square(kLever_m);
+  rate.position_m2 =
+      square(drift.position_sigma_m_sqrtm) * Matrix3d::Identity() + inherited * position_m2;
   const Eigen::Matrix2d tilt_rad2 = local.block<2, 2>(3, 3);
   rate.tilt_rad2 =
-      (square(drift.tilt_sigma_rad_sqrtm) + rough_rad2) * Eigen::Matrix2d::Identity() +
+      square(drift.tilt_sigma_rad_sqrtm) * Eigen::Matrix2d::Identity() +
       inherited * std::min(most_rad2, tilt_rad2.trace()) * tilt_rad2 / (tilt_rad2.trace() + 1e-18);
-  rate.yaw_rad2 =
-      square(drift.yaw_sigma_rad_sqrtm) + rough_rad2 + inherited * std::min(most_rad2, local(5, 5));
+  rate.yaw_rad2 = square(drift.yaw_sigma_rad_sqrtm) + inherited * std::min(most_rad2, local(5, 5));
   return rate;
 }
 

@@ -19,13 +19,11 @@ struct DriftRate {
 };
 
 /// The configured walk, and what the map inherits. New map is laid with the error that the pose has
-/// relative to the old map, so over the length on which the map is renewed its covariance (ROS
-/// order) is passed on once. What is no plane, as foliage, looks different from every place:
-/// neighbouring scans share that error, so it does not average out within a scan, but over the
-/// metres. It goes with the variance of the map's points across their planes.
+/// relative to the old map. Neighbouring scans see the same patches and share that error, so it
+/// does not average out from scan to scan; over the length on which patches are renewed its
+/// covariance (ROS order) is passed on once.
 DriftRate drift_rate(const DriftConfig& drift,
-                     const Matrix6d& pose_covariance_in_local_map = Matrix6d::Zero(),
-                     double roughness2_m2 = 0.0);
+                     const Matrix6d& pose_covariance_in_local_map = Matrix6d::Zero());
 
 /// Covariance that the drift of heading and position at `p_odom_m` adds to a transform
 /// (yaw, x, y, z) from odom into a frame turned by `R_frame_odom`: the heading turns about the

@@ -53,7 +53,7 @@ void ImuRateOdometry::restart(const ScanFilter& filter, const ImuBuffer& imu) {
   running_ = true;
   stamp_ns_ = filter.stamp_ns();
   state_ = filter.state();
-  covariance_ = filter.covariance();
+  covariance_ = filter.stated_covariance();
   drift_covariance_ = filter.pose_covariance() - filter.pose_covariance_in_local_map();
   catch_up(imu);
 }

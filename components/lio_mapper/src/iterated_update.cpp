@@ -118,6 +118,13 @@ UpdateResult iterated_update(const State& prior,
       prior, covariance, [&](const State& state) { return linearise(state.T_odom_base); }, limits);
 }
 
+ErrorMatrix conditioned(const ErrorMatrix& covariance, const Matrix6d& information) {
+  ErrorMatrix told = covariance - gain_of<error::kPose>(covariance, information) * information *
+                                      covariance.topRows<error::kPose>();
+  make_symmetric(told);
+  return told;
+}
+
 UpdateResult iterated_update_with_extrinsic(
     const State& prior,
     const ErrorMatrix& covariance,

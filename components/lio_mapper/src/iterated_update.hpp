@@ -83,4 +83,7 @@ UpdateResult iterated_update_with_extrinsic(
                                                     const Pose& T_base_lidar)>& linearise,
     const IterationLimits& limits);
 
+/// The covariance of who is also told of the pose what `information` knows (axes of the error).
+ErrorMatrix conditioned(const ErrorMatrix& covariance, const Matrix6d& information);
+
 }  // namespace trigpoint::lio_mapper

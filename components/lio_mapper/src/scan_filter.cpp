@@ -164,7 +164,7 @@ void ScanFilter::add_drift(Prediction& prediction) {
     return;
   }
   distance_m_ += moved_m;
-  const DriftRate rate = drift_rate(config_.drift, pose_covariance_in_local_map(), roughness2_m2_);
+  const DriftRate rate = drift_rate(config_.drift, pose_covariance_in_local_map());
   Matrix6d at_robot = Matrix6d::Zero();
   at_robot.topLeftCorner<3, 3>() = moved_m * rate.position_m2;
   at_robot.block<2, 2>(3, 3) = moved_m * rate.tilt_rad2;
@@ -219,9 +219,15 @@ UpdateResult ScanFilter::match(const Prediction& prediction,
       thinned_base, *map_, prediction.state.T_base_lidar, config_.matching, *workers_);
   UpdateResult result = update(prediction, matcher);
   outcome.used = result.used;
+  known_by_patches_.setZero();
   if (result.used && result.measured.weight_per_m2 > 0.0) {
-    roughness2_m2_ = result.measured.weighted_thickness2 / result.measured.weight_per_m2;
     blind_ = blindness(result.measured.information.topLeftCorner<3, 3>());
+    if (!config_.extrinsic.estimate) {
+      PoseInformation known;
+      known.information = matcher.information_by_patches();
+      doubt_bent_map(prediction.covariance, known);
+      known_by_patches_ = known.information;
+    }
   }
   outcome.matches = result.count;
   outcome.iterations = result.iterations;
@@ -343,6 +349,7 @@ ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu, const 
   record.before_rows = prediction.state;
   record.covariance_before_rows = prediction.covariance;
   record.transition = prediction.transition;
+  known_by_patches_.setZero();
   if (outcome.first) {
     outcome.used = outcome.points >= static_cast<std::size_t>(config_.matching.min_matches);
   } else if (match_it) {
@@ -416,7 +423,11 @@ RowVerdict ScanFilter::apply(const StateUpdate& update) {
 Matrix6d ScanFilter::pose_covariance_in_local_map() const {
   Matrix6d to_odom = Matrix6d::Identity();
   to_odom.bottomRightCorner<3, 3>() = state().T_odom_base.q.toRotationMatrix();
-  return to_odom * covariance().topLeftCorner<6, 6>() * to_odom.transpose();
+  return to_odom * stated_covariance().topLeftCorner<6, 6>() * to_odom.transpose();
+}
+
+ErrorMatrix ScanFilter::stated_covariance() const {
+  return conditioned(covariance(), known_by_patches_);
 }
 
 Matrix6d ScanFilter::placement_covariance() const {

@@ -115,6 +115,10 @@ class ScanFilter {
   Matrix6d pose_covariance() const;
   /// Only relative to the local map, in ROS order.
   Matrix6d pose_covariance_in_local_map() const;
+  /// That of the state, as it is stated. The filter weighs a scan as if all residuals in a patch
+  /// were wrong together, so that its gains are those of who trusts no single scan far; what a scan
+  /// is worth, its patches show.
+  ErrorMatrix stated_covariance() const;
   /// Of T_map_odom: yaw, x, y, z, tilt x, tilt y.
   Matrix6d placement_covariance() const;
 
@@ -157,7 +161,8 @@ class ScanFilter {
   bool aligned_{false};
   double distance_m_{0.0};
   Eigen::Vector3d pruned_at_m_{Eigen::Vector3d::Zero()};
-  double roughness2_m2_{0.0};  ///< of the planes that the last usable scan met
+  /// What the newest scan knows of the pose by its patches, see scan_matcher.hpp.
+  Matrix6d known_by_patches_{Matrix6d::Zero()};
   /// Of the last usable scan, see drift.hpp.
   Eigen::Matrix3d blind_{Eigen::Matrix3d::Zero()};
   Matrix6d drift_covariance_{Matrix6d::Zero()};  ///< of odom, about its origin, ROS order

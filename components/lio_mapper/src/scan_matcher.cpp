@@ -304,6 +304,7 @@ Information<Size> ScanMatcher::weighed(Information<Size> sum,
                                        double least_scatter,
                                        Scratch<Size>& scratch) {
   if (sum.count == 0) {
+    scratch.kept.setZero();
     return sum;
   }
   using Matrix = typename Information<Size>::Matrix;
@@ -311,14 +312,17 @@ Information<Size> ScanMatcher::weighed(Information<Size> sum,
   Matrix root_trust = Matrix::Identity();
   root_trust.template topLeftCorner<3, 3>() = open_.root_trust;
   const Eigen::LLT<Matrix> root(sum.information + kUnseen * Matrix::Identity());
-  const typename Information<Size>::Vector step = -root.solve(sum.gradient);
-  allow_for_scatter(scatter_after(step, scratch), root, step, least_scatter, sum);
+  scratch.unweighed = sum.information;
+  scratch.step = -root.solve(sum.gradient);
+  allow_for_scatter(scatter_after(scratch.step, scratch), root, scratch.step, least_scatter, sum);
   const auto most = static_cast<std::size_t>(config_.max_patches);
   const double scale =
       static_cast<double>(std::min(count_patches(), most)) / static_cast<double>(sum.count);
-  const Matrix both = root_trust * by;
-  sum.information = (scale * both * sum.information * both.transpose()).eval();
-  sum.gradient = (scale * root_trust * both * sum.gradient).eval();
+  // Planes that go through the points that they explain are no witnesses that patches differ.
+  scratch.least_scatter = also_nearest_ ? 1.0 / scale : least_scatter;
+  scratch.kept = root_trust * by;
+  sum.information = (scale * scratch.kept * sum.information * scratch.kept.transpose()).eval();
+  sum.gradient = (scale * root_trust * scratch.kept * sum.gradient).eval();
   sum.noise *= scale;
   return sum;
 }

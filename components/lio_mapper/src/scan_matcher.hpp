@@ -46,6 +46,13 @@ class ScanMatcher {
                                         const Pose& T_base_lidar,
                                         const MapOrigins& origins);
 
+  /// What the last linearisation of the pose alone knows of it when patches, not points, are what
+  /// is drawn: residuals in one patch share the map's errors, and by how much is seen in what the
+  /// patches pull at the optimum (the covariance that is robust to clusters [K.-Y. Liang, S. L.
+  /// Zeger, "Longitudinal data analysis using generalized linear models", Biometrika 73, 1986]).
+  /// None along axes that fewer than four patches hold. 1/m^2 and 1/rad^2, in the error's axes.
+  Matrix6d information_by_patches() const;
+
   /// Share of the points that lie within `distance_m` of their plane at the last linearisation.
   double share_within(double distance_m) const;
 
@@ -81,6 +88,13 @@ class ScanMatcher {
   struct Scratch {
     std::vector<Information<Size>> sums;                   ///< of blocks
     std::vector<typename Information<Size>::Vector> rows;  ///< of residuals
+    // Of the last complete sum: as it was before it was weighed, the step that it asks for, ...
+    typename Information<Size>::Matrix unweighed{Information<Size>::Matrix::Zero()};
+    typename Information<Size>::Vector step{Information<Size>::Vector::Zero()};
+    // ... the share that is left along axes that are noisy or open, and the least that residuals
+    // may scatter by, in parts of their stated variances.
+    typename Information<Size>::Matrix kept{Information<Size>::Matrix::Zero()};
+    double least_scatter{1.0};
   };
 
   /// What a patch of a scan that is displaced by d pulls it back, and what A promises: sums of

@@ -136,6 +136,18 @@ TEST(IteratedUpdate, transition_tells_what_is_left_of_an_error_of_the_prior) {
   }
 }
 
+TEST(IteratedUpdate, covariance_of_who_is_told_more_is_that_of_the_summed_information) {
+  const ErrorMatrix P = random_covariance(7, 0.1);
+  Matrix6d known = random_covariance(8, 30.0).topLeftCorner<6, 6>();
+  known.col(2).setZero();  // nothing of the height
+  known.row(2).setZero();
+  ErrorMatrix information = P.inverse();
+  information.topLeftCorner<6, 6>() += known;
+  const ErrorMatrix expected = information.inverse();
+  EXPECT_LT((conditioned(P, known) - expected).norm(), 1e-9 * P.norm());
+  EXPECT_LT((conditioned(P, Matrix6d::Zero()) - P).norm(), 1e-12 * P.norm());
+}
+
 TEST(IteratedUpdate, leaves_the_prior_alone_when_residuals_are_too_few) {
   const State prior = random_state(1);
   const ErrorMatrix P = random_covariance(2, 0.1);

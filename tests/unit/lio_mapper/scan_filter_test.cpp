@@ -102,19 +102,19 @@ TEST(Drift, heading_noise_turns_about_the_robot_and_leaves_its_place_in_map) {
   EXPECT_NEAR(noise(0, 0), 1e-4, 1e-12);
 }
 
-TEST(Drift, position_gathers_its_walk_a_share_of_the_roughness_and_one_of_the_local_covariance) {
+TEST(Drift, pose_gathers_its_walk_and_a_share_of_the_local_covariance) {
   DriftConfig drift;
   drift.position_sigma_m_sqrtm = 0.003;
   drift.map_renewal_per_m = 0.1;
-  drift.roughness_per_m = 0.02;
   Matrix6d local = Matrix6d::Zero();
-  local.diagonal().head<3>() << 1e-4, 4e-4, 1.0;  // the last above what is passed on
-  const DriftRate rate = drift_rate(drift, local, 0.05 * 0.05);
+  local.diagonal() << 1e-4, 4e-4, 1.0, 1e-6, 2e-6, 3e-6;  // height above what is passed on
+  const DriftRate rate = drift_rate(drift, local);
   const Eigen::Vector3d expected_m2 =
-      Eigen::Vector3d::Constant(9e-6 + 0.02 * 0.0024) + 0.1 * Eigen::Vector3d(1e-4, 4e-4, 1e-2);
+      Eigen::Vector3d::Constant(9e-6) + 0.1 * Eigen::Vector3d(1e-4, 4e-4, 9e-4);
   EXPECT_LT((rate.position_m2.diagonal() - expected_m2).norm(), 1e-12);
-  // The same over ten metres turns it.
-  EXPECT_NEAR(rate.yaw_rad2, 0.02 * 0.0024 / 100.0 + 25e-10, 1e-15);
+  EXPECT_NEAR(rate.tilt_rad2(0, 0), 4e-10 + 1e-7, 1e-15);
+  EXPECT_NEAR(rate.tilt_rad2(1, 1), 4e-10 + 2e-7, 1e-15);
+  EXPECT_NEAR(rate.yaw_rad2, 4e-10 + 3e-7, 1e-15);
 }
 
 TEST(Drift, tilt_noise_turns_odom_about_the_robot_and_leaves_its_place_in_map) {

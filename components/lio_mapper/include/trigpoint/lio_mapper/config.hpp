@@ -98,13 +98,11 @@ struct LocalMapConfig {
 
 /// How fast odom drifts away from the truth: random walk of T_map_odom per metre driven.
 struct DriftConfig {
-  double position_sigma_m_sqrtm{0.0005};
-  double yaw_sigma_rad_sqrtm{5e-5};
-  double tilt_sigma_rad_sqrtm{5e-5};
+  double position_sigma_m_sqrtm{0.0002};
+  double yaw_sigma_rad_sqrtm{2e-5};
+  double tilt_sigma_rad_sqrtm{2e-5};
   /// Share of the pose's covariance relative to the local map that the map inherits per metre.
-  double map_renewal_per_m{0.02};
-  /// Share of the variance of the map's points across their planes that the pose gathers per metre.
-  double roughness_per_m{0.008};
+  double map_renewal_per_m{0.33};
   /// Random walk of the tilt of odom against gravity that moves the robot along an axis which scans
   /// do not hold.
   double blind_tilt_rad_sqrts{1.6e-3};
