@@ -39,13 +39,30 @@ LioDriveOptions estimating(bool estimate, bool wrong) {
   return options;
 }
 
-/// Prints; asserts nothing about the estimate's sigma, which is far too small (README,
-/// Calibration): that is why it is off by default.
-TEST(Extrinsic, table_of_right_and_wrong_configurations) {
+constexpr double kRollPitchTolerance_deg = 0.15;
+constexpr double kYawTolerance_deg = 0.75;  // turns do not show it
+constexpr double kMostNees = 3.0;
+constexpr double kLeastNees = 0.05;
+
+/// Roll, pitch and yaw about base's axes.
+Eigen::Vector3d turn_error_deg(const lio_mapper::Calibration& calibration, const Pose& truth) {
+  return so3_log(calibration.T_base_lidar.q * truth.q.conjugate()) / kDegree;
+}
+
+double rotation_nees(const lio_mapper::Calibration& calibration, const Pose& truth) {
+  const Eigen::Vector3d e = extrinsic_error(calibration, truth).tail<3>();
+  const Eigen::Matrix3d P = calibration.extrinsic_covariance.bottomRightCorner<3, 3>();
+  return e.dot(P.ldlt().solve(e)) / 3.0;
+}
+
+TEST(Extrinsic, rotation_is_found_and_a_right_configuration_costs_nothing) {
   const simulator::Scenario scenario = simulator::load_scenario("campus");
   std::printf(
       "right/wrong est  seed  mean m   level   up  | roll pitch yaw deg (sigma) | x y z cm "
-      "(sigma) | nees/6\n");
+      "(sigma) | rotation's nees/3\n");
+  double nees = 0.0;
+  double exact_m = 0.0;
+  double estimated_m = 0.0;
   for (const bool wrong : {false, true}) {
     for (const bool estimate : {false, true}) {
       const auto drives = drive_lio_all(kSeeds, [&](int i) {
@@ -88,13 +105,26 @@ TEST(Extrinsic, table_of_right_and_wrong_configurations) {
                 100 * s[0],
                 100 * s[1],
                 100 * s[2],
-                e.dot(P.ldlt().solve(e)) / 6.0);
+                rotation_nees(at->calibration, scenario.robot.T_base_lidar()));
           }
+          const Eigen::Vector3d turn_deg =
+              turn_error_deg(drive.calibration, scenario.robot.T_base_lidar());
+          EXPECT_LT(turn_deg.head<2>().cwiseAbs().maxCoeff(), kRollPitchTolerance_deg);
+          EXPECT_LT(std::abs(turn_deg[2]), kYawTolerance_deg);
+          EXPECT_EQ(drive.said("extrinsic_differs"), wrong);
+          EXPECT_TRUE(drive.said("extrinsic_settled"));
+          nees += rotation_nees(drive.calibration, scenario.robot.T_base_lidar()) / (2.0 * kSeeds);
+        }
+        if (!wrong) {
+          (estimate ? estimated_m : exact_m) += error.position_m.mean;
         }
         std::printf("\n");
       }
     }
   }
+  EXPECT_GT(nees, kLeastNees);
+  EXPECT_LT(nees, kMostNees);
+  EXPECT_LT(estimated_m, 1.1 * exact_m);
 }
 
 TEST(LidarClock, offset_is_found_within_two_milliseconds_and_warned_about_only_when_there_is_one) {

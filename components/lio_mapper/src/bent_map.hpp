@@ -19,9 +19,8 @@ inline constexpr double kBend_rad = 0.01;
 /// the information A, N = kBend^2 times that across is such. The rest, f = 1 - N / A, is taken as
 /// with noisy normals: the information f^2 A with the gradient f g.
 /// `covariance`: of the prior, m^2 in odom's axes.
-template <int Size>
-void doubt_bent_map(const ErrorMatrix& covariance, Information<Size>& measured) {
-  const Eigen::Matrix3d A = measured.information.template topLeftCorner<3, 3>();
+inline void doubt_bent_map(const ErrorMatrix& covariance, PoseInformation& measured) {
+  const Eigen::Matrix3d A = measured.information.topLeftCorner<3, 3>();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(
       covariance.block<3, 3>(error::kPosition, error::kPosition));
   Eigen::Matrix3d keep = Eigen::Matrix3d::Zero();
@@ -31,11 +30,9 @@ void doubt_bent_map(const ErrorMatrix& covariance, Information<Size>& measured) 
     const double none = kBend_rad * kBend_rad * (A.trace() - along);
     keep += std::max(0.0, 1.0 - none / (along + 1e-12)) * axis * axis.transpose();
   }
-  measured.information.template topRows<3>() =
-      (keep * measured.information.template topRows<3>()).eval();
-  measured.information.template leftCols<3>() =
-      (measured.information.template leftCols<3>() * keep).eval();
-  measured.gradient.template head<3>() = (keep * measured.gradient.template head<3>()).eval();
+  measured.information.topRows<3>() = (keep * measured.information.topRows<3>()).eval();
+  measured.information.leftCols<3>() = (measured.information.leftCols<3>() * keep).eval();
+  measured.gradient.head<3>() = (keep * measured.gradient.head<3>()).eval();
 }
 
 }  // namespace trigpoint::lio_mapper

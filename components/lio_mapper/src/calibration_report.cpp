@@ -4,6 +4,8 @@
 
 #include "trigpoint/base/so3.hpp"
 
+#include <Eigen/Eigenvalues>
+
 #include <cmath>
 #include <cstdio>
 
@@ -20,7 +22,6 @@ constexpr double kRotationWarning_rad = 0.01745;
 constexpr double kPositionWarning_m = 0.05;
 constexpr double kExtrinsicSigmas = 3.0;
 constexpr double kSettledRotation_rad = 3e-3;
-constexpr double kSettledPosition_m = 0.03;
 
 /// |d| over its sigma along itself.
 double sigmas_of(const Vector3d& d, const Matrix3d& covariance) {
@@ -121,10 +122,9 @@ void CalibrationReport::look_at_extrinsic(const Calibration& calibration,
                       text + std::string("rather ") + extrinsic_text(calibration)});
     extrinsic_warned_ = true;
   }
-  // Height shows only where roll or pitch change, so the other two axes decide.
-  const double level_m = std::sqrt(std::max(position(0, 0), position(1, 1)));
-  if (!extrinsic_settled_ && largest_sigma(rotation) < kSettledRotation_rad &&
-      level_m < kSettledPosition_m) {
+  // About the axis of most turns little shows, so the other two decide.
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> axes(rotation, Eigen::EigenvaluesOnly);
+  if (!extrinsic_settled_ && axes.eigenvalues()[1] < kSettledRotation_rad * kSettledRotation_rad) {
     events.push_back({Severity::kInfo, stamp_ns, "extrinsic_settled", extrinsic_text(calibration)});
     extrinsic_settled_ = true;
   }

@@ -2,8 +2,6 @@
 // Copyright the Trigpoint developers
 #include "clock_offset.hpp"
 
-#include "trigpoint/base/so3.hpp"
-
 #include <Eigen/LU>
 
 #include <algorithm>
@@ -11,16 +9,8 @@
 
 namespace trigpoint::lio_mapper {
 
-using Eigen::Quaterniond;
-using Eigen::Vector3d;
-
 namespace {
 
-constexpr double kWindow_s = 3.0;
-constexpr std::size_t kFewest = 12;  ///< scans in a window that counts
-constexpr double kLongestClockStep_s = 0.02;
-/// A longer interval between two scans ends the window.
-constexpr double kLongestPause_s = 0.35;
 constexpr double kPriorOffset_s = 0.1;
 /// Crystals differ by 20 to 100 parts in a million.
 constexpr double kPriorRate = 1e-4;
@@ -62,52 +52,12 @@ std::vector<double> without_line(const std::vector<double>& t, std::vector<doubl
 
 }  // namespace
 
-void ClockOffsetEstimator::interrupt() {
-  close_window();
-  window_.clear();
-}
-
-void ClockOffsetEstimator::add(Nanoseconds stamp_ns,
-                               const Quaterniond& q_odom_base,
-                               const Vector3d& gyro_bias_radps,
-                               const ImuBuffer& imu) {
-  const bool ends = !window_.empty() && (to_seconds(stamp_ns - newest_ns_) > kLongestPause_s ||
-                                         to_seconds(stamp_ns - begin_ns_) > kWindow_s);
-  if (ends) {
-    interrupt();
-  }
-  const auto steps = window_.empty()
-                         ? imu.steps_between(stamp_ns - 1, stamp_ns, kLongestClockStep_s)
-                         : imu.steps_between(newest_ns_, stamp_ns, kLongestClockStep_s);
-  if (steps.empty()) {
-    return;
-  }
-  Sample sample{0.0, q_odom_base, q_odom_base, Vector3d::Zero()};
-  if (window_.empty()) {
-    begin_ns_ = stamp_ns;
-    gyro_bias_radps_ = gyro_bias_radps;
-  } else {
-    sample.time_s = to_seconds(stamp_ns - begin_ns_);
-    sample.q_gyro = window_.back().q_gyro;
-    for (const InertialStep& step : steps) {
-      sample.q_gyro =
-          sample.q_gyro *
-          so3_exp(step.duration_s() *
-                  (0.5 * (step.begin.gyro_radps + step.end.gyro_radps) - gyro_bias_radps_));
-    }
-    sample.q_gyro.normalize();
-  }
-  sample.rate_odom_radps = q_odom_base * (steps.back().end.gyro_radps - gyro_bias_radps_);
-  window_.push_back(sample);
-  newest_ns_ = stamp_ns;
-}
-
-void ClockOffsetEstimator::close_window() {
-  if (window_.size() < kFewest) {
+void ClockOffsetEstimator::add(const AttitudeWindow& window) {
+  if (window.samples.empty()) {
     return;
   }
   std::vector<double> t;
-  for (const Sample& sample : window_) {
+  for (const AttitudeSample& sample : window.samples) {
     t.push_back(sample.time_s);
   }
   WindowFit fit;
@@ -116,8 +66,8 @@ void ClockOffsetEstimator::close_window() {
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> y;
     std::vector<double> w;
-    for (const Sample& sample : window_) {
-      y.push_back(so3_log(sample.q_scan * sample.q_gyro.conjugate())[axis]);
+    for (const AttitudeSample& sample : window.samples) {
+      y.push_back(sample.difference_rad()[axis]);
       w.push_back(sample.rate_odom_radps[axis]);
     }
     y = without_line(t, std::move(y));
@@ -137,7 +87,7 @@ void ClockOffsetEstimator::close_window() {
 
   const double share = 1.0 / std::min(static_cast<double>(++windows_), kMemory_windows);
   noise2_rad2_ += share * (fit.residual2_rad2 - noise2_rad2_);
-  const Nanoseconds middle_ns = begin_ns_ + (newest_ns_ - begin_ns_) / 2;
+  const Nanoseconds middle_ns = window.begin_ns + (window.end_ns - window.begin_ns) / 2;
   if (windows_ == 1) {
     covariance_ =
         Eigen::Vector2d(kPriorOffset_s * kPriorOffset_s, kPriorRate * kPriorRate).asDiagonal();

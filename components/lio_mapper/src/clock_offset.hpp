@@ -11,13 +11,11 @@
 
 #include "trigpoint/base/time.hpp"
 
-#include "imu_buffer.hpp"
+#include "attitude_window.hpp"
 #include <Eigen/Core>
-#include <Eigen/Geometry>
 
 #include <cstddef>
 #include <optional>
-#include <vector>
 
 namespace trigpoint::lio_mapper {
 
@@ -28,32 +26,13 @@ struct ClockOffset {
 
 class ClockOffsetEstimator {
  public:
-  /// The attitude that a scan alone found at its stamp. Scans in order; `imu` reaches back to the
-  /// scan before.
-  void add(Nanoseconds stamp_ns,
-           const Eigen::Quaterniond& q_odom_base,
-           const Eigen::Vector3d& gyro_bias_radps,
-           const ImuBuffer& imu);
-  /// A scan is missing or not to be trusted: the window ends without it.
-  void interrupt();
+  /// Windows in order of time; an empty one is none.
+  void add(const AttitudeWindow& window);
 
   /// Once enough has been seen.
   std::optional<ClockOffset> estimate() const;
 
  private:
-  struct Sample {
-    double time_s;              ///< since the window began
-    Eigen::Quaterniond q_scan;  ///< odom
-    Eigen::Quaterniond q_gyro;  ///< the window's first attitude, carried on by the gyro
-    Eigen::Vector3d rate_odom_radps;
-  };
-
-  void close_window();
-
-  Nanoseconds newest_ns_{0};
-  Nanoseconds begin_ns_{0};
-  Eigen::Vector3d gyro_bias_radps_{Eigen::Vector3d::Zero()};
-  std::vector<Sample> window_;
   // A Kalman filter over windows: offset and its rate at `updated_ns_`.
   Nanoseconds updated_ns_{0};
   Eigen::Vector2d state_{Eigen::Vector2d::Zero()};

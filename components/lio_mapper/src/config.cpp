@@ -128,14 +128,15 @@ void describe_matching(MatchingConfig& c, ConfigFields& f) {
 void describe_extrinsic(ExtrinsicConfig& c, ConfigFields& f) {
   f.flag("estimate",
          c.estimate,
-         "whether robot.lidar_* are where the estimate starts (true) or taken as exact (false)");
+         "whether robot.lidar_roll_pitch_yaw_base_rad is where the estimate starts (true), which "
+         "turns teach about the axes across them, or taken as exact (false)");
   f.number("rotation_sigma_rad",
            c.rotation_sigma_rad,
            "how well the configured rotation is known, each axis",
            kNotNegative);
   f.number("position_sigma_m",
            c.position_sigma_m,
-           "how well the configured position is known, each axis",
+           "how well the configured position is known, each axis: it is stated and stays",
            kNotNegative);
 }
 

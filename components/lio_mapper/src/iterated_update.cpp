@@ -10,19 +10,16 @@ namespace trigpoint::lio_mapper {
 
 namespace {
 
-template <int Size>
-using Gain = Eigen::Matrix<double, error::kSize, Size>;
+using Gain = Eigen::Matrix<double, error::kSize, error::kPose>;
 
 /// P_{:,6} (I + A P_66)^-1.
-template <int Size>
-Gain<Size> gain_of(const ErrorMatrix& covariance,
-                   const Eigen::Matrix<double, Size, Size>& information) {
-  using Square = Eigen::Matrix<double, Size, Size>;
-  const Square system = Square::Identity() + information * covariance.topLeftCorner<Size, Size>();
+Gain gain_of(const ErrorMatrix& covariance, const Matrix6d& information) {
+  const Matrix6d system =
+      Matrix6d::Identity() + information * covariance.topLeftCorner<error::kPose, error::kPose>();
   // X system = P_{:,6}  <=>  system^T X^T = P_{:,6}^T
   return system.transpose()
       .partialPivLu()
-      .solve(covariance.leftCols<Size>().transpose())
+      .solve(covariance.leftCols<error::kPose>().transpose())
       .transpose();
 }
 
@@ -57,17 +54,18 @@ UpdateResult unused(const State& prior, const ErrorMatrix& covariance) {
   return result;
 }
 
-template <int Size, typename Linearise>
-UpdateResult iterate(const State& prior,
-                     const ErrorMatrix& covariance,
-                     const Linearise& linearise,
-                     const IterationLimits& limits) {
+}  // namespace
+
+UpdateResult iterated_update(const State& prior,
+                             const ErrorMatrix& covariance,
+                             const std::function<PoseInformation(const Pose&)>& linearise,
+                             const IterationLimits& limits) {
   UpdateResult result;
   result.state = prior;
   result.covariance = covariance;
   State state = prior;
   while (result.iterations < limits.max_iterations && !result.converged) {
-    const Information<Size> measured = linearise(state);
+    const PoseInformation measured = linearise(state.T_odom_base);
     if (measured.count < limits.min_count) {
       return unused(prior, covariance);
     }
@@ -75,15 +73,10 @@ UpdateResult iterate(const State& prior,
     const PriorJacobian jacobian = prior_jacobian(state, prior, difference);
     const ErrorVector back = to_tangent_of_state(jacobian, difference);
     const ErrorMatrix P = to_tangent_of_state(jacobian, covariance);
-    const Gain<Size> gain = gain_of<Size>(P, measured.information);
+    const Gain gain = gain_of(P, measured.information);
     const ErrorVector step =
-        -gain * (measured.gradient - measured.information * back.template head<Size>()) - back;
-    result.measured = {measured.information.template topLeftCorner<error::kPose, error::kPose>(),
-                       measured.gradient.template head<error::kPose>(),
-                       measured.noise,
-                       measured.weight_per_m2,
-                       measured.weighted_thickness2,
-                       measured.count};
+        -gain * (measured.gradient - measured.information * back.head<error::kPose>()) - back;
+    result.measured = measured;
     result.measured_at = state.T_odom_base;
     state = boxplus(state, step);
     result.count = measured.count;
@@ -92,9 +85,8 @@ UpdateResult iterate(const State& prior,
     if (result.converged || result.iterations == limits.max_iterations) {
       const ErrorMatrix to_state =
           transition_to_tangent_of_state(jacobian, ErrorMatrix::Identity());
-      result.covariance = P - gain * measured.information * P.template topRows<Size>();
-      result.transition =
-          to_state - gain * measured.information * to_state.template topRows<Size>();
+      result.covariance = P - gain * measured.information * P.topRows<error::kPose>();
+      result.transition = to_state - gain * measured.information * to_state.topRows<error::kPose>();
     }
   }
   make_symmetric(result.covariance);
@@ -108,33 +100,11 @@ UpdateResult iterate(const State& prior,
   return result;
 }
 
-}  // namespace
-
-UpdateResult iterated_update(const State& prior,
-                             const ErrorMatrix& covariance,
-                             const std::function<PoseInformation(const Pose&)>& linearise,
-                             const IterationLimits& limits) {
-  return iterate<error::kPose>(
-      prior, covariance, [&](const State& state) { return linearise(state.T_odom_base); }, limits);
-}
-
 ErrorMatrix conditioned(const ErrorMatrix& covariance, const Matrix6d& information) {
-  ErrorMatrix told = covariance - gain_of<error::kPose>(covariance, information) * information *
+  ErrorMatrix told = covariance - gain_of(covariance, information) * information *
                                       covariance.topRows<error::kPose>();
   make_symmetric(told);
   return told;
-}
-
-UpdateResult iterated_update_with_extrinsic(
-    const State& prior,
-    const ErrorMatrix& covariance,
-    const std::function<PoseAndExtrinsicInformation(const Pose&, const Pose&)>& linearise,
-    const IterationLimits& limits) {
-  return iterate<error::kPoseAndExtrinsic>(
-      prior,
-      covariance,
-      [&](const State& state) { return linearise(state.T_odom_base, state.T_base_lidar); },
-      limits);
 }
 
 }  // namespace trigpoint::lio_mapper

@@ -19,14 +19,10 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 /// What measurements say around one state: the normal equations of their residuals r with Jacobian
-/// H over the error's first `Size` columns.
-template <int Size>
-struct Information {
-  using Matrix = Eigen::Matrix<double, Size, Size>;
-  using Vector = Eigen::Matrix<double, Size, 1>;
-
-  Matrix information{Matrix::Zero()};  ///< H^T R^-1 H
-  Vector gradient{Vector::Zero()};     ///< H^T R^-1 r
+/// H over the error's first six columns, the pose.
+struct PoseInformation {
+  Matrix6d information{Matrix6d::Zero()};  ///< H^T R^-1 H
+  Vector6d gradient{Vector6d::Zero()};     ///< H^T R^-1 r
   /// What the noise of the planes' normals adds to the position's information though it tells
   /// nothing; already taken out when the sum is complete.
   Eigen::Matrix3d noise{Eigen::Matrix3d::Zero()};
@@ -37,9 +33,6 @@ struct Information {
   std::size_t count{0};           ///< residuals in it
   double weighted_variance{0.0};  ///< sum of their variances times their weights
 };
-
-using PoseInformation = Information<error::kPose>;
-using PoseAndExtrinsicInformation = Information<error::kPoseAndExtrinsic>;
 
 struct IterationLimits {
   std::int64_t max_iterations{5};
@@ -68,20 +61,11 @@ struct UpdateResult {
 /// Iterates x <- x [+] (-K r - (I - K H) J^-1 (x [-] prior)), [1] eq. 18, with the gain in the form
 /// K = (H^T R^-1 H + P^-1)^-1 H^T R^-1 of [1] eq. 20, here as
 /// K R-weighted = P_{:,6} (I + A P_66)^-1 with A = H^T R^-1 H: the matrix inversion lemma on the
-/// six columns that H has (twelve with the extrinsic), so that only a system of that size is solved
-/// and P is never inverted.
+/// six columns that H has, so that only a system of that size is solved and P is never inverted.
 UpdateResult iterated_update(const State& prior,
                              const ErrorMatrix& covariance,
                              const std::function<PoseInformation(const Pose&)>& linearise,
                              const IterationLimits& limits);
-
-/// The same where residuals also see T_base_lidar.
-UpdateResult iterated_update_with_extrinsic(
-    const State& prior,
-    const ErrorMatrix& covariance,
-    const std::function<PoseAndExtrinsicInformation(const Pose& T_odom_base,
-                                                    const Pose& T_base_lidar)>& linearise,
-    const IterationLimits& limits);
 
 /// The covariance of who is also told of the pose what `information` knows (axes of the error).
 ErrorMatrix conditioned(const ErrorMatrix& covariance, const Matrix6d& information);

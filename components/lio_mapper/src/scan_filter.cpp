@@ -36,6 +36,8 @@ constexpr double kFoundRotation_rad = 0.01;
 constexpr double kSmear_m = 0.02;
 constexpr double kSmear_rad = 2e-3;
 constexpr int kMostReshapes = 2;
+/// A smaller turn of the extrinsic is none.
+constexpr double kLeastCorrection_rad = 1e-6;
 /// A scan is put into the map unmatched only while its pose relative to the map is this certain.
 constexpr double kMapSigma_m = 0.3;
 
@@ -117,6 +119,7 @@ ScanFilter::ScanFilter(const Config& config,
       observe_(std::move(observe)),
       workers_(std::make_unique<Workers>(static_cast<std::size_t>(config.matching.threads))),
       map_(make_local_map(config.local_map)),
+      extrinsic_rotation_(config.extrinsic.rotation_sigma_rad),
       history_(config.rows) {}
 
 Nanoseconds ScanFilter::stamp_ns() const {
@@ -194,20 +197,11 @@ UpdateResult ScanFilter::update(const Prediction& prediction, ScanMatcher& match
     begin(Stage::kSolve);
     return information;
   };
-  if (!config_.extrinsic.estimate) {
-    return iterated_update(
-        prediction.state,
-        prediction.covariance,
-        [&](const Pose& T_odom_base) {
-          return timed([&] { return matcher.linearise(T_odom_base); });
-        },
-        limits);
-  }
-  return iterated_update_with_extrinsic(
+  return iterated_update(
       prediction.state,
       prediction.covariance,
-      [&](const Pose& T_odom_base, const Pose& T_base_lidar) {
-        return timed([&] { return matcher.linearise(T_odom_base, T_base_lidar, origins_); });
+      [&](const Pose& T_odom_base) {
+        return timed([&] { return matcher.linearise(T_odom_base); });
       },
       limits);
 }
@@ -222,12 +216,10 @@ UpdateResult ScanFilter::match(const Prediction& prediction,
   known_by_patches_.setZero();
   if (result.used && result.measured.weight_per_m2 > 0.0) {
     blind_ = blindness(result.measured.information.topLeftCorner<3, 3>());
-    if (!config_.extrinsic.estimate) {
-      PoseInformation known;
-      known.information = matcher.information_by_patches();
-      doubt_bent_map(prediction.covariance, known);
-      known_by_patches_ = known.information;
-    }
+    PoseInformation known;
+    known.information = matcher.information_by_patches();
+    doubt_bent_map(prediction.covariance, known);
+    known_by_patches_ = known.information;
   }
   outcome.matches = result.count;
   outcome.iterations = result.iterations;
@@ -314,21 +306,51 @@ bool ScanFilter::search(const PoseSearch& look,
   return result.used;
 }
 
-void ScanFilter::compare_clocks(const UpdateResult& result,
-                                Nanoseconds stamp_ns,
-                                const ImuBuffer& imu) {
+void ScanFilter::compare_with_gyro(const UpdateResult& result,
+                                   Nanoseconds stamp_ns,
+                                   const ImuBuffer& imu) {
   const auto attitude = result.used ? attitude_of_scan(result) : std::nullopt;
   const bool gap = imu.longest_gap_s(this->stamp_ns(), stamp_ns) > config_.imu.max_gap_s;
-  if (attitude && !gap) {
-    clock_offset_.add(stamp_ns, *attitude, result.state.gyro_bias_radps, imu);
-  } else {
-    clock_offset_.interrupt();
+  learn_from(attitude && !gap ? windows_.add(stamp_ns, *attitude, result.state.gyro_bias_radps, imu)
+                              : windows_.interrupt());
+}
+
+void ScanFilter::learn_from(const AttitudeWindow& window) {
+  clock_offset_.add(window);
+  if (config_.extrinsic.estimate) {
+    extrinsic_rotation_.add(window, extrinsic_taken_rad_);
   }
+}
+
+/// Takes what is known of the extrinsic by now. The LiDAR stays where it is in odom, as scans hold
+/// it there; base turns under it. What the accelerometer sees turns along, but how far gravity
+/// itself had followed the wrong extrinsic is open.
+void ScanFilter::turn_extrinsic(Prediction& prediction) {
+  State& state = prediction.state;
+  const double turn_rad =
+      (extrinsic_rotation_.certain_turn_base_rad() - extrinsic_taken_rad_).norm();
+  if (turn_rad > kLeastCorrection_rad) {
+    // What follows is compared with the gyro anew.
+    learn_from(windows_.interrupt());
+    extrinsic_taken_rad_ = extrinsic_rotation_.certain_turn_base_rad();
+    const Pose T_odom_lidar = state.T_odom_base * state.T_base_lidar;
+    const Eigen::Quaterniond before = state.T_odom_base.q;
+    state.T_base_lidar.q = (so3_exp(extrinsic_taken_rad_) * T_base_lidar_.q).normalized();
+    state.T_odom_base = T_odom_lidar * state.T_base_lidar.inverse();
+    state.gravity_odom_mps2 = state.T_odom_base.q * before.conjugate() * state.gravity_odom_mps2;
+    prediction.covariance.diagonal().segment<2>(error::kGravity).array() += turn_rad * turn_rad;
+  }
+  const Matrix3d R_lidar_base = state.T_base_lidar.q.toRotationMatrix().transpose();
+  prediction.covariance.block<3, 3>(error::kExtrinsicRotation, error::kExtrinsicRotation) =
+      R_lidar_base * extrinsic_rotation_.covariance() * R_lidar_base.transpose();
 }
 
 ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu, const PoseSearch& look) {
   begin(Stage::kPredict);
   Prediction prediction = predict(sweep, imu);
+  if (config_.extrinsic.estimate) {
+    turn_extrinsic(prediction);
+  }
   add_drift(prediction);
   add_clock_noise(sweep, prediction);
   add_blind_tilt_noise(config_.drift,
@@ -356,15 +378,10 @@ ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu, const 
     const UpdateResult result = prediction.guessed
                                     ? match_guessed(sweep, prediction, outcome)
                                     : match(prediction, outcome.thinned_base, outcome);
-    compare_clocks(result, sweep.end_ns, imu);
+    compare_with_gyro(result, sweep.end_ns, imu);
     record.before_rows = result.state;
     record.covariance_before_rows = result.covariance;
     record.transition = result.transition * prediction.transition;
-    if (config_.extrinsic.estimate) {
-      const Pose T_base_base = result.state.T_base_lidar * prediction.state.T_base_lidar.inverse();
-      outcome.points_base = transformed(outcome.points_base, T_base_base);
-      outcome.thinned_base = transformed(outcome.thinned_base, T_base_base);
-    }
   }
   record.path = std::move(prediction.path);
   history_.push(std::move(record));
@@ -379,13 +396,9 @@ PointCloud ScanFilter::insert(const ScanOutcome& outcome) {
   if (outcome.used || sigma2 < kMapSigma_m * kMapSigma_m) {
     points_odom = transformed(outcome.thinned_base, state().T_odom_base);
     map_->insert(points_odom);
-    if (config_.extrinsic.estimate) {
-      origins_.insert(points_odom, state().T_odom_base, state().T_base_lidar);
-    }
   }
   if ((p - pruned_at_m_).norm() > config_.local_map.prune_every_m) {
     map_->prune(p, config_.local_map.half_side_m);
-    origins_.prune(p, config_.local_map.half_side_m);
     pruned_at_m_ = p;
   }
   return points_odom;

@@ -7,11 +7,12 @@
 #include "trigpoint/lio_mapper/lio_mapper.hpp"
 #include "trigpoint/lio_mapper/stages.hpp"
 
+#include "attitude_window.hpp"
 #include "clock_offset.hpp"
+#include "extrinsic_rotation.hpp"
 #include "imu_buffer.hpp"
 #include "iterated_update.hpp"
 #include "local_map.hpp"
-#include "map_origins.hpp"
 #include "row_history.hpp"
 #include "sweep.hpp"
 #include "workers.hpp"
@@ -146,7 +147,9 @@ class ScanFilter {
   UpdateResult match(const Prediction& prediction,
                      const PointCloud& thinned_base,
                      ScanOutcome& outcome);
-  void compare_clocks(const UpdateResult& result, Nanoseconds stamp_ns, const ImuBuffer& imu);
+  void turn_extrinsic(Prediction& prediction);
+  void compare_with_gyro(const UpdateResult& result, Nanoseconds stamp_ns, const ImuBuffer& imu);
+  void learn_from(const AttitudeWindow& window);
   UpdateResult update(const Prediction& prediction, ScanMatcher& matcher);
 
   Config config_;
@@ -155,8 +158,10 @@ class ScanFilter {
   StageObserver observe_;
   std::unique_ptr<Workers> workers_;
   std::unique_ptr<LocalMap> map_;
-  MapOrigins origins_;  ///< empty unless the extrinsic is estimated
+  AttitudeWindows windows_;
   ClockOffsetEstimator clock_offset_;
+  ExtrinsicRotationEstimator extrinsic_rotation_;
+  Eigen::Vector3d extrinsic_taken_rad_{Eigen::Vector3d::Zero()};  ///< of its turn, into the state
   RowHistory history_;
   bool aligned_{false};
   double distance_m_{0.0};

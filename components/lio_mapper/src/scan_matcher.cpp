@@ -36,26 +36,24 @@ void add_noise(const Vector3d& normal, double weighted_tilt2, Eigen::Matrix3d& n
 
 /// Of the residuals' variance that which is the map's: points on one plane share it, so that it
 /// does not scatter between them.
-template <int Size>
-double share_of_map(const Information<Size>& sum) {
+double share_of_map(const PoseInformation& sum) {
   return (kLeastVariance_m2 * sum.weight_per_m2 + sum.weighted_thickness2) /
          (sum.weighted_variance + 1e-12);
 }
 
 /// The plane's normal stands in the columns of the position. All of the matrix is summed: half of
 /// it takes longer.
-template <int Size>
-void add_row(const typename Information<Size>::Vector& h,
+void add_row(const Vector6d& h,
              double weight,
              double residual_m,
              const PlaneMatch& plane,
-             Information<Size>& sum) {
+             PoseInformation& sum) {
   sum.information.noalias() += (weight * h) * h.transpose();
   sum.gradient += weight * residual_m * h;
   sum.weight_per_m2 += weight;
   sum.weighted_thickness2 += weight * plane.thickness2_m2;
   ++sum.count;
-  add_noise(h.template segment<3>(error::kPosition), weight * plane.tilt2_rad2, sum.noise);
+  add_noise(h.segment<3>(error::kPosition), weight * plane.tilt2_rad2, sum.noise);
 }
 
 /// Normals are measured too. Along a tunnel none has a true component, but their noise has one, and
@@ -65,11 +63,8 @@ void add_row(const typename Information<Size>::Vector& h,
 /// noise and f = 1 - N / A: the solution g / (A - N) has the variance A / (A - N)^2, which is that
 /// of the information f^2 A with the gradient f g.
 /// Along no axis is more left than `pulled_back` says.
-template <int Size>
-typename Information<Size>::Matrix noise_free_share(const Information<Size>& sum,
-                                                    const Eigen::Matrix3d& pulled_back) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(
-      sum.information.template topLeftCorner<3, 3>());
+Matrix6d noise_free_share(const PoseInformation& sum, const Eigen::Matrix3d& pulled_back) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(sum.information.topLeftCorner<3, 3>());
   Eigen::Matrix3d keep = Eigen::Matrix3d::Zero();
   for (int i = 0; i < 3; ++i) {
     const Vector3d axis = axes.eigenvectors().col(i);
@@ -78,8 +73,8 @@ typename Information<Size>::Matrix noise_free_share(const Information<Size>& sum
                                   axis.dot(pulled_back * axis));
     keep += share * axis * axis.transpose();
   }
-  typename Information<Size>::Matrix by = Information<Size>::Matrix::Identity();
-  by.template topLeftCorner<3, 3>() = keep;
+  Matrix6d by = Matrix6d::Identity();
+  by.topLeftCorner<3, 3>() = keep;
   return by;
 }
 
@@ -89,13 +84,12 @@ typename Information<Size>::Matrix noise_free_share(const Information<Size>& sum
 /// and the eigenvalues of L^-1 B L^-T are how many times the stated variance that is, direction by
 /// direction. Each such direction keeps its estimate and loses that share of its information, or
 /// gains it where they scatter less, down to the share `least` of the stated variance.
-template <int Size>
-void allow_for_scatter(const typename Information<Size>::Matrix& scatter,
-                       const Eigen::LLT<typename Information<Size>::Matrix>& root,
-                       const typename Information<Size>::Vector& step,
+void allow_for_scatter(const Matrix6d& scatter,
+                       const Eigen::LLT<Matrix6d>& root,
+                       const Vector6d& step,
                        double least,
-                       Information<Size>& sum) {
-  using Matrix = typename Information<Size>::Matrix;
+                       PoseInformation& sum) {
+  using Matrix = Matrix6d;
   // What no residual sees scatters as the root says, neither more nor less.
   const Matrix half = root.matrixL().solve((scatter + kUnseen * Matrix::Identity()).eval());
   const Matrix times_stated = root.matrixL().solve(half.transpose());
@@ -115,7 +109,6 @@ ScanMatcher::ScanMatcher(const PointCloud& points_base,
                          Workers& workers)
     : points_base_(points_base),
       map_(map),
-      T_base_lidar_(T_base_lidar),
       config_(config),
       workers_(workers),
       residuals_(points_base.size()),
@@ -123,7 +116,7 @@ ScanMatcher::ScanMatcher(const PointCloud& points_base,
   for (std::size_t i = 0; i < points_base.size(); ++i) {
     Residual& r = residuals_[i];
     r.point_base_m = points_base[i].position().cast<double>();
-    const Vector3d beam_m = r.point_base_m - T_base_lidar_.p;
+    const Vector3d beam_m = r.point_base_m - T_base_lidar.p;
     r.range_m = beam_m.norm();
     r.direction_base = beam_m / std::max(r.range_m, kLeastRange_m);
   }
@@ -149,7 +142,6 @@ ScanMatcher::Found ScanMatcher::look_up(Ask ask, Residual& r) const {
     return Found::kNothing;
   }
   r.residual_m = r.plane.normal.dot(r.looked_up_at_odom_m) + r.plane.offset_m;
-  r.origin = nullptr;
   const bool fits = r.range_m >= kLeastRange_m &&
                     std::abs(r.residual_m) <= kGatePerRootRange * std::sqrt(r.range_m);
   return fits ? Found::kPlane : Found::kMisfit;
@@ -164,7 +156,7 @@ bool ScanMatcher::needs_nearest(Found found, const Residual& r) const {
 }
 
 /// A point that moved little since it was looked up keeps what was found.
-void ScanMatcher::refresh(std::size_t i, const Viewpoint& view, const MapOrigins* origins) {
+void ScanMatcher::refresh(std::size_t i, const Viewpoint& view) {
   Residual& r = residuals_[i];
   const Vector3d point_odom_m = view.R_odom_base * r.point_base_m + view.T_odom_base.p;
   const bool kept = found_[i] != Found::kNotAsked &&
@@ -178,9 +170,6 @@ void ScanMatcher::refresh(std::size_t i, const Viewpoint& view, const MapOrigins
   if (ask_nearest) {
     r.is_of_nearest = look_up(&LocalMap::match_nearest, r) == Found::kPlane;
     found_[i] = r.is_of_nearest ? Found::kPlane : Found::kNoNearest;
-  }
-  if (origins != nullptr && found_[i] == Found::kPlane && (!kept || ask_nearest)) {
-    r.origin = origins->find(r.looked_up_at_odom_m);
   }
 }
 
@@ -201,8 +190,7 @@ void ScanMatcher::weigh(Residual& r, double cos_incidence) const {
   r.weight = surface * (ratio > 1.0 ? 1.0 / ratio : 1.0) / variance;
 }
 
-template <>
-Vector6d ScanMatcher::row_of<error::kPose>(Residual& r, const Viewpoint& view) const {
+Vector6d ScanMatcher::row_of(Residual& r, const Viewpoint& view) const {
   const Vector3d normal_base = view.R_odom_base.transpose() * r.plane.normal;
   r.residual_m =
       normal_base.dot(r.point_base_m) + r.plane.normal.dot(view.T_odom_base.p) + r.plane.offset_m;
@@ -213,80 +201,37 @@ Vector6d ScanMatcher::row_of<error::kPose>(Residual& r, const Viewpoint& view) c
   return h;
 }
 
-template <>
-PoseAndExtrinsicInformation::Vector ScanMatcher::row_of<error::kPoseAndExtrinsic>(
-    Residual& r,
-    const Viewpoint& view) const {
-  const Vector3d point_base_m = view.T_base_base * r.point_base_m;
-  const Vector3d point_odom_m = view.R_odom_base * point_base_m + view.T_odom_base.p;
-  Vector3d normal = r.plane.normal;
-  // The point of the plane below the measured one.
-  Vector3d foot_odom_m = point_odom_m - (normal.dot(point_odom_m) + r.plane.offset_m) * normal;
-  PoseAndExtrinsicInformation::Vector h = PoseAndExtrinsicInformation::Vector::Zero();
-  if (r.origin != nullptr) {
-    // Seen again from where it was made, through the present extrinsic.
-    const Pose& T_odom_then = r.origin->T_odom_base;
-    const Pose T_odom_lidar_then = T_odom_then * r.origin->T_base_lidar;
-    const Pose T_odom_lidar = T_odom_then * view.T_base_lidar;
-    const Vector3d foot_lidar_m = T_odom_lidar_then.inverse() * foot_odom_m;
-    normal = T_odom_lidar.q * (T_odom_lidar_then.q.conjugate() * normal);
-    foot_odom_m = T_odom_lidar * foot_lidar_m;
-    const Vector3d normal_base = view.R_odom_base.transpose() * normal;
-    const Vector3d point_lidar_m = T_base_lidar_.inverse() * r.point_base_m;
-    const Vector3d normal_lidar = T_odom_lidar.q.conjugate() * normal;
-    // The last term: the plane turns.
-    h.segment<3>(error::kExtrinsicRotation) =
-        point_lidar_m.cross(view.T_base_lidar.q.conjugate() * normal_base) -
-        foot_lidar_m.cross(normal_lidar) +
-        normal_lidar.cross(T_odom_lidar.q.conjugate() * (point_odom_m - foot_odom_m));
-    h.segment<3>(error::kExtrinsicPosition) = normal_base - T_odom_then.q.conjugate() * normal;
-  }
-  const Vector3d normal_base = view.R_odom_base.transpose() * normal;
-  r.residual_m = normal.dot(point_odom_m - foot_odom_m);
-  weigh(r, normal_base.dot(r.direction_base));
-  h.segment<3>(error::kPosition) = normal;
-  h.segment<3>(error::kRotation) = point_base_m.cross(normal_base);
-  return h;
-}
-
 /// sum w^2 r^2 h h^T with the residuals r after `step` from where they were linearised.
-template <int Size>
-typename Information<Size>::Matrix ScanMatcher::scatter_after(
-    const typename Information<Size>::Vector& step,
-    Scratch<Size>& scratch) {
-  using Matrix = typename Information<Size>::Matrix;
-  scratch.sums.assign(blocks(), {});
+Matrix6d ScanMatcher::scatter_after(const Vector6d& step) {
+  scratch_.sums.assign(blocks(), {});
   in_blocks([&](std::size_t block, std::size_t i) {
     if (found_[i] == Found::kPlane) {
-      const typename Information<Size>::Vector& h = scratch.rows[i];
+      const Vector6d& h = scratch_.rows[i];
       const double part = residuals_[i].weight * (residuals_[i].residual_m + h.dot(step));
-      scratch.sums[block].information.noalias() += (part * part * h) * h.transpose();
+      scratch_.sums[block].information.noalias() += (part * part * h) * h.transpose();
     }
   });
-  Matrix sum = Matrix::Zero();
-  for (const Information<Size>& part : scratch.sums) {
+  Matrix6d sum = Matrix6d::Zero();
+  for (const PoseInformation& part : scratch_.sums) {
     sum += part.information;
   }
   return sum;
 }
 
-template <int Size>
-Information<Size> ScanMatcher::sum_of_all(const Viewpoint& view,
-                                          const MapOrigins* origins,
-                                          Scratch<Size>& scratch) {
-  scratch.sums.assign(blocks(), {});
-  scratch.rows.resize(residuals_.size());
+PoseInformation ScanMatcher::sum_of_all(const Viewpoint& view) {
+  scratch_.sums.assign(blocks(), {});
+  scratch_.rows.resize(residuals_.size());
   in_blocks([&](std::size_t block, std::size_t i) {
-    refresh(i, view, origins);
+    refresh(i, view);
     if (found_[i] == Found::kPlane) {
       Residual& r = residuals_[i];
-      scratch.rows[i] = row_of<Size>(r, view);
-      add_row(scratch.rows[i], r.weight, r.residual_m, r.plane, scratch.sums[block]);
-      scratch.sums[block].weighted_variance += r.weight * r.variance_m2;
+      scratch_.rows[i] = row_of(r, view);
+      add_row(scratch_.rows[i], r.weight, r.residual_m, r.plane, scratch_.sums[block]);
+      scratch_.sums[block].weighted_variance += r.weight * r.variance_m2;
     }
   });
-  Information<Size> sum;
-  for (const Information<Size>& part : scratch.sums) {
+  PoseInformation sum;
+  for (const PoseInformation& part : scratch_.sums) {
     sum.information += part.information;
     sum.gradient += part.gradient;
     sum.noise += part.noise;
@@ -299,30 +244,26 @@ Information<Size> ScanMatcher::sum_of_all(const Viewpoint& view,
 }
 
 /// What the sum over all residuals is worth.
-template <int Size>
-Information<Size> ScanMatcher::weighed(Information<Size> sum,
-                                       double least_scatter,
-                                       Scratch<Size>& scratch) {
+PoseInformation ScanMatcher::weighed(PoseInformation sum, double least_scatter) {
   if (sum.count == 0) {
-    scratch.kept.setZero();
+    scratch_.kept.setZero();
     return sum;
   }
-  using Matrix = typename Information<Size>::Matrix;
-  const Matrix by = noise_free_share(sum, open_.pulled_back);
-  Matrix root_trust = Matrix::Identity();
-  root_trust.template topLeftCorner<3, 3>() = open_.root_trust;
-  const Eigen::LLT<Matrix> root(sum.information + kUnseen * Matrix::Identity());
-  scratch.unweighed = sum.information;
-  scratch.step = -root.solve(sum.gradient);
-  allow_for_scatter(scatter_after(scratch.step, scratch), root, scratch.step, least_scatter, sum);
+  const Matrix6d by = noise_free_share(sum, open_.pulled_back);
+  Matrix6d root_trust = Matrix6d::Identity();
+  root_trust.topLeftCorner<3, 3>() = open_.root_trust;
+  const Eigen::LLT<Matrix6d> root(sum.information + kUnseen * Matrix6d::Identity());
+  scratch_.unweighed = sum.information;
+  scratch_.step = -root.solve(sum.gradient);
+  allow_for_scatter(scatter_after(scratch_.step), root, scratch_.step, least_scatter, sum);
   const auto most = static_cast<std::size_t>(config_.max_patches);
   const double scale =
       static_cast<double>(std::min(count_patches(), most)) / static_cast<double>(sum.count);
   // Planes that go through the points that they explain are no witnesses that patches differ.
-  scratch.least_scatter = also_nearest_ ? 1.0 / scale : least_scatter;
-  scratch.kept = root_trust * by;
-  sum.information = (scale * scratch.kept * sum.information * scratch.kept.transpose()).eval();
-  sum.gradient = (scale * root_trust * scratch.kept * sum.gradient).eval();
+  scratch_.least_scatter = also_nearest_ ? 1.0 / scale : least_scatter;
+  scratch_.kept = root_trust * by;
+  sum.information = (scale * scratch_.kept * sum.information * scratch_.kept.transpose()).eval();
+  sum.gradient = (scale * root_trust * scratch_.kept * sum.gradient).eval();
   sum.noise *= scale;
   return sum;
 }
@@ -345,50 +286,30 @@ void ScanMatcher::forget_judgement() {
   }
 }
 
-template <int Size>
-Information<Size> ScanMatcher::linearise_all(const Viewpoint& view,
-                                             const MapOrigins* origins,
-                                             Scratch<Size>& scratch) {
+PoseInformation ScanMatcher::linearise(const Pose& T_odom_base) {
+  const Viewpoint view{T_odom_base, T_odom_base.q.toRotationMatrix()};
   const bool judge = is_judgement_due(view.T_odom_base);
   if (judge) {
     forget_judgement();
     judged_at_ = view.T_odom_base;
   }
-  Information<Size> sum = sum_of_all(view, origins, scratch);
+  PoseInformation sum = sum_of_all(view);
   if (judge) {
-    const auto cautious = weighed(sum, 1.0, scratch);
-    also_nearest_ = leaves_pose_open(cautious.information.template topLeftCorner<6, 6>());
+    const auto cautious = weighed(sum, 1.0);
+    also_nearest_ = leaves_pose_open(cautious.information);
     if (also_nearest_) {
-      sum = sum_of_all(view, origins, scratch);
+      sum = sum_of_all(view);
       const bool any_nearest = std::any_of(
           residuals_.begin(), residuals_.end(), [](const Residual& r) { return r.is_of_nearest; });
       if (any_nearest) {
-        const auto promised = weighed(sum, 1.0, scratch);
-        judge_open_axes(view, promised.information.template topLeftCorner<3, 3>());
+        const auto promised = weighed(sum, 1.0);
+        judge_open_axes(view, promised.information.topLeftCorner<3, 3>());
       }
     }
   }
   // A plane of the few points nearest to one that is matched goes through them whatever their
   // noise: that residuals against such planes are small is no witness.
-  return weighed(sum, also_nearest_ ? 1.0 : share_of_map(sum), scratch);
-}
-
-PoseInformation ScanMatcher::linearise(const Pose& T_odom_base) {
-  return linearise_all(
-      Viewpoint{T_odom_base, T_odom_base.q.toRotationMatrix(), T_base_lidar_, Pose{}},
-      nullptr,
-      scratch_);
-}
-
-PoseAndExtrinsicInformation ScanMatcher::linearise(const Pose& T_odom_base,
-                                                   const Pose& T_base_lidar,
-                                                   const MapOrigins& origins) {
-  return linearise_all(Viewpoint{T_odom_base,
-                                 T_odom_base.q.toRotationMatrix(),
-                                 T_base_lidar,
-                                 T_base_lidar * T_base_lidar_.inverse()},
-                       &origins,
-                       scratch_with_extrinsic_);
+  return weighed(sum, also_nearest_ ? 1.0 : share_of_map(sum));
 }
 
 double ScanMatcher::share_within(double distance_m) const {

@@ -7,7 +7,6 @@
 
 #include "iterated_update.hpp"
 #include "local_map.hpp"
-#include "map_origins.hpp"
 #include "workers.hpp"
 #include <Eigen/Core>
 
@@ -39,14 +38,7 @@ class ScanMatcher {
   /// open, points without one, or with a rough one, are matched with their nearest points.
   PoseInformation linearise(const Pose& T_odom_base);
 
-  /// The same with the extrinsic as unknown, r = n . (R (R_bl p_l + t_bl) + p) + d. Where the map's
-  /// origin is known (R_0, p_0, and the extrinsic then), the plane moves with the extrinsic as the
-  /// points that made it do; elsewhere the residual is taken to know nothing of the extrinsic.
-  PoseAndExtrinsicInformation linearise(const Pose& T_odom_base,
-                                        const Pose& T_base_lidar,
-                                        const MapOrigins& origins);
-
-  /// What the last linearisation of the pose alone knows of it when patches, not points, are what
+  /// What the last linearisation knows of the pose when patches, not points, are what
   /// is drawn: residuals in one patch share the map's errors, and by how much is seen in what the
   /// patches pull at the optimum (the covariance that is robust to clusters [K.-Y. Liang, S. L.
   /// Zeger, "Longitudinal data analysis using generalized linear models", Biometrika 73, 1986]).
@@ -69,7 +61,6 @@ class ScanMatcher {
     double residual_m;
     double variance_m2;
     double weight;
-    const MapOrigin* origin;  ///< of the plane; null: unknown, or not asked for
     bool is_of_nearest{false};
     std::uint32_t patch;  ///< which cube of matching.patch_m it lies in
     std::uint32_t cell;   ///< which smaller one; set where an axis is open
@@ -79,21 +70,18 @@ class ScanMatcher {
   struct Viewpoint {
     Pose T_odom_base;
     Eigen::Matrix3d R_odom_base;
-    Pose T_base_lidar;
-    Pose T_base_base;  ///< from the axes of the points to those of the present extrinsic
   };
 
   /// Of one linearisation.
-  template <int Size>
   struct Scratch {
-    std::vector<Information<Size>> sums;                   ///< of blocks
-    std::vector<typename Information<Size>::Vector> rows;  ///< of residuals
+    std::vector<PoseInformation> sums;  ///< of blocks
+    std::vector<Vector6d> rows;         ///< of residuals
     // Of the last complete sum: as it was before it was weighed, the step that it asks for, ...
-    typename Information<Size>::Matrix unweighed{Information<Size>::Matrix::Zero()};
-    typename Information<Size>::Vector step{Information<Size>::Vector::Zero()};
+    Matrix6d unweighed{Matrix6d::Zero()};
+    Vector6d step{Vector6d::Zero()};
     // ... the share that is left along axes that are noisy or open, and the least that residuals
     // may scatter by, in parts of their stated variances.
-    typename Information<Size>::Matrix kept{Information<Size>::Matrix::Zero()};
+    Matrix6d kept{Matrix6d::Zero()};
     double least_scatter{1.0};
   };
 
@@ -119,7 +107,7 @@ class ScanMatcher {
 
   enum class Found : std::uint8_t { kNotAsked, kNothing, kNoNearest, kMisfit, kPlane };
 
-  void refresh(std::size_t i, const Viewpoint& view, const MapOrigins* origins);
+  void refresh(std::size_t i, const Viewpoint& view);
   Found look_up(Ask ask, Residual& residual) const;
   bool needs_nearest(Found found, const Residual& residual) const;
   bool is_judgement_due(const Pose& T_odom_base) const;
@@ -128,11 +116,8 @@ class ScanMatcher {
   double variance_m2(const Residual& residual, double cos_incidence) const;
   void weigh(Residual& residual, double cos_incidence) const;
   /// Puts residual and weight of `view` into `residual` and gives its row of the Jacobian.
-  template <int Size>
-  typename Information<Size>::Vector row_of(Residual& residual, const Viewpoint& view) const;
-  template <int Size>
-  typename Information<Size>::Matrix scatter_after(const typename Information<Size>::Vector& step,
-                                                   Scratch<Size>& scratch);
+  Vector6d row_of(Residual& residual, const Viewpoint& view) const;
+  Matrix6d scatter_after(const Vector6d& step);
   void add_pulls(Viewpoint view,
                  const Eigen::Vector3d& axis_odom,
                  double displaced_m,
@@ -147,20 +132,11 @@ class ScanMatcher {
 
   template <typename Visit>
   void in_blocks(const Visit& visit);
-  template <int Size>
-  Information<Size> sum_of_all(const Viewpoint& view,
-                               const MapOrigins* origins,
-                               Scratch<Size>& scratch);
-  template <int Size>
-  Information<Size> weighed(Information<Size> sum, double least_scatter, Scratch<Size>& scratch);
-  template <int Size>
-  Information<Size> linearise_all(const Viewpoint& view,
-                                  const MapOrigins* origins,
-                                  Scratch<Size>& scratch);
+  PoseInformation sum_of_all(const Viewpoint& view);
+  PoseInformation weighed(PoseInformation sum, double least_scatter);
 
   const PointCloud& points_base_;
   const LocalMap& map_;
-  Pose T_base_lidar_;
   const MatchingConfig& config_;
   Workers& workers_;
   std::optional<Pose> judged_at_;  ///< where it was asked whether surfaces are enough
@@ -169,8 +145,7 @@ class ScanMatcher {
   std::vector<Residual> residuals_;  ///< one a point, also where none was found
   std::vector<Found> found_;
   std::vector<std::uint8_t> patches_;  ///< whether a residual lies in it
-  Scratch<error::kPose> scratch_;
-  Scratch<error::kPoseAndExtrinsic> scratch_with_extrinsic_;
+  Scratch scratch_;
 };
 
 /// Block by block, so that sums of blocks that are added in order have the same rounding on any

@@ -26,8 +26,7 @@ inline constexpr int kGravity = 21;           ///< 2 angles on the sphere, rad
 inline constexpr int kYawMapOdom = 23;        ///< rad
 inline constexpr int kPositionMapOdom = 24;   ///< m
 inline constexpr int kSize = 27;
-inline constexpr int kPose = 6;               ///< position and rotation come first
-inline constexpr int kPoseAndExtrinsic = 12;  ///< then the extrinsic: all that a scan sees
+inline constexpr int kPose = 6;  ///< position and rotation come first: what a scan sees
 }  // namespace error
 
 using ErrorVector = Eigen::Matrix<double, error::kSize, 1>;

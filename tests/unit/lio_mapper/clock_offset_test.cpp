@@ -34,6 +34,7 @@ std::optional<ClockOffset> estimate_after(double duration_s,
   std::mt19937 random(seed);
   std::normal_distribution<double> normal(0.0, 1.0);
   ClockOffsetEstimator estimator;
+  AttitudeWindows windows;
   ImuBuffer imu;
   const Eigen::Vector3d bias{0.002, -0.003, 0.004};
   int next_imu = -20;
@@ -47,10 +48,11 @@ std::optional<ClockOffset> estimate_after(double duration_s,
       imu.push({kClockEpoch_ns + from_seconds(t), rate + bias, Eigen::Vector3d::Zero()});
     }
     const Eigen::Vector3d noise{normal(random), normal(random), normal(random)};
-    estimator.add(kClockEpoch_ns + from_seconds(now_s),
-                  attitude(now_s + offset_s, turns) * so3_exp(kAttitudeNoise_rad * noise),
-                  Eigen::Vector3d::Zero(),
-                  imu);
+    estimator.add(
+        windows.add(kClockEpoch_ns + from_seconds(now_s),
+                    attitude(now_s + offset_s, turns) * so3_exp(kAttitudeNoise_rad * noise),
+                    Eigen::Vector3d::Zero(),
+                    imu));
     imu.forget_before(kClockEpoch_ns + from_seconds(now_s));
   }
   return estimator.estimate();

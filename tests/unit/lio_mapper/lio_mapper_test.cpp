@@ -3,8 +3,10 @@
 #include "trigpoint/lio_mapper/lio_mapper.hpp"
 
 #include "trigpoint/base/config.hpp"
+#include "trigpoint/base/so3.hpp"
 
 #include "room_drive.hpp"
+#include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -23,7 +25,8 @@ constexpr int kImuPerSweep = 20;
 /// Feeds a drive in order of availability and keeps what comes out.
 class Drive {
  public:
-  explicit Drive(const Config& config = {}) : mapper(config, RobotConfig{}) {}
+  explicit Drive(const Config& config = {}, const RobotConfig& robot = {})
+      : mapper(config, robot) {}
 
   /// Sweeps [from, to) with their IMU samples; `change` may spoil inputs, or drop them (false).
   void drive(const RoomDrive& room, int from, int to) {
@@ -103,6 +106,31 @@ TEST(LioMapper, drives_twenty_seconds_through_a_hall_of_planes_within_two_centim
   EXPECT_NEAR(run.mapper.status().distance_m, 30.0, 8.0);
   EXPECT_LT(run.error(room, run.newest_imu_rate).norm(), kTolerance_m);
   EXPECT_GT(run.imu_rate, 1700);  // 100 Hz but for the start
+}
+
+TEST(LioMapper, finds_how_the_lidar_is_turned_and_what_was_right_stays_right) {
+  constexpr double kTolerance_rad = 4e-3;
+  const RoomDrive room;
+  for (const Eigen::Vector3d& wrong_rad :
+       {Eigen::Vector3d(0.02, -0.015, 0.0), Eigen::Vector3d(0.0, 0.0, 0.0)}) {
+    RobotConfig robot;
+    const Eigen::Quaterniond q_true = robot.T_base_lidar().q;
+    robot.lidar_roll_pitch_yaw_base_rad += wrong_rad;
+    Config config;
+    config.extrinsic.estimate = true;
+    Drive run(config, robot);
+    run.drive(room, 0, 300);
+    run.take(run.mapper.finish());
+    const Calibration found = run.mapper.calibration();
+    const Eigen::Vector3d error_rad = so3_log(found.T_base_lidar.q * q_true.conjugate());
+    EXPECT_LT(error_rad.head<2>().norm(), kTolerance_rad) << wrong_rad.transpose();
+    EXPECT_EQ(found.T_base_lidar.p, robot.T_base_lidar().p);
+    const Eigen::Matrix3d covariance = found.extrinsic_covariance.bottomRightCorner<3, 3>();
+    EXPECT_LT(std::sqrt(covariance(0, 0)), 0.5 * kTolerance_rad);
+    EXPECT_LT(error_rad.dot(covariance.ldlt().solve(error_rad)), 16.3);  // chi-square of 3, 0.1 %
+    EXPECT_EQ(run.said("extrinsic_differs"), !wrong_rad.isZero());
+    EXPECT_EQ(run.mapper.status().health, LioHealth::kOk);
+  }
 }
 
 TEST(LioMapper, finds_its_speed_and_level_when_it_starts_in_motion) {

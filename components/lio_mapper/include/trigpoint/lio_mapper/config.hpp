@@ -81,7 +81,7 @@ struct MatchingConfig {
   double lost_after_s{2.0};  ///< coasting longer than this is LOST
 };
 
-/// Estimation of where the LiDAR sits, about the configured place.
+/// Estimation of how the LiDAR is turned, about what is configured.
 struct ExtrinsicConfig {
   bool estimate{false};
   double rotation_sigma_rad{0.03};
