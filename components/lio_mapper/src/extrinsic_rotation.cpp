@@ -42,21 +42,28 @@ Columns without_lines(const Columns& y, const Eigen::VectorXd& t) {
 }  // namespace
 
 ExtrinsicRotationEstimator::ExtrinsicRotationEstimator(double sigma_rad)
-    : configured_sigma_rad_(sigma_rad),
+    : most_when_certain_rad2_(kCertain * kCertain * sigma_rad * sigma_rad),
       covariance_rad2_(sigma_rad * sigma_rad * Matrix3d::Identity()),
       excess_(kShared) {}
 
 Vector3d ExtrinsicRotationEstimator::certain_turn_base_rad() const {
-  const double least_rad = kCertain * configured_sigma_rad_;
   const Eigen::SelfAdjointEigenSolver<Matrix3d> axes(covariance_rad2_);
-  Vector3d certain = Vector3d::Zero();
+  Vector3d along = axes.eigenvectors().transpose() * turn_rad_;
   for (int i = 0; i < 3; ++i) {
-    const Vector3d axis = axes.eigenvectors().col(i);
-    if (axes.eigenvalues()[i] < least_rad * least_rad) {
-      certain += axis.dot(turn_rad_) * axis;
+    along[i] = axes.eigenvalues()[i] < most_when_certain_rad2_ ? along[i] : 0.0;
+  }
+  return axes.eigenvectors() * along;
+}
+
+Matrix3d ExtrinsicRotationEstimator::certain_covariance() const {
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> axes(covariance_rad2_);
+  Vector3d variances = axes.eigenvalues();
+  for (int i = 0; i < 3; ++i) {
+    if (!(variances[i] < most_when_certain_rad2_)) {
+      variances[i] = most_when_certain_rad2_ / (kCertain * kCertain);
     }
   }
-  return certain;
+  return axes.eigenvectors() * variances.asDiagonal() * axes.eigenvectors().transpose();
 }
 
 void ExtrinsicRotationEstimator::add(const AttitudeWindow& window, const Vector3d& taken_base_rad) {

@@ -37,10 +37,14 @@ class ExtrinsicRotationEstimator {
   /// for their noise.
   Eigen::Vector3d certain_turn_base_rad() const;
 
+  /// Of turn_base_rad(), rad^2 about base's axes.
   const Eigen::Matrix3d& covariance() const { return covariance_rad2_; }
 
+  /// Of who takes certain_turn_base_rad(): about the other axes the configuration's.
+  Eigen::Matrix3d certain_covariance() const;
+
  private:
-  double configured_sigma_rad_;
+  double most_when_certain_rad2_;  ///< variance about an axis
   Eigen::Vector3d turn_rad_{Eigen::Vector3d::Zero()};
   Eigen::Matrix3d covariance_rad2_;
   std::size_t windows_{0};

@@ -342,7 +342,7 @@ void ScanFilter::turn_extrinsic(Prediction& prediction) {
   }
   const Matrix3d R_lidar_base = state.T_base_lidar.q.toRotationMatrix().transpose();
   prediction.covariance.block<3, 3>(error::kExtrinsicRotation, error::kExtrinsicRotation) =
-      R_lidar_base * extrinsic_rotation_.covariance() * R_lidar_base.transpose();
+      R_lidar_base * extrinsic_rotation_.certain_covariance() * R_lidar_base.transpose();
 }
 
 ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu, const PoseSearch& look) {

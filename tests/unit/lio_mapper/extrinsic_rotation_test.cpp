@@ -118,6 +118,9 @@ TEST(ExtrinsicRotation, is_certain_along_axes_that_turns_taught_and_nothing_alon
   const auto flat = [](double t) { return from_yaw(1.2 * std::sin(0.3 * t)); };
   EXPECT_EQ(after(90.0, on_a_line, lacking_rad, 1).certain_turn_base_rad().norm(), 0.0);
   const Eigen::Vector3d certain = after(90.0, flat, lacking_rad, 1).certain_turn_base_rad();
+  const Eigen::Matrix3d covariance = after(90.0, flat, lacking_rad, 1).certain_covariance();
+  EXPECT_NEAR(std::sqrt(covariance(2, 2)), kTurnPrior_rad, 1e-3);
+  EXPECT_LT(std::sqrt(covariance(0, 0)), 2e-3);
   EXPECT_LT((certain - Eigen::Vector3d(0.02, -0.02, 0.0)).norm(), 3e-3);
 }
 
