@@ -6,6 +6,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -19,9 +20,9 @@ namespace {
 constexpr double kClockWarning_s = 5e-3;
 constexpr double kClockSigmas = 4.0;
 constexpr double kRotationWarning_rad = 0.01745;
-constexpr double kPositionWarning_m = 0.05;
 constexpr double kExtrinsicSigmas = 3.0;
 constexpr double kSettledRotation_rad = 3e-3;
+constexpr double kSettledShare = 0.25;  // of the configuration's sigma
 
 /// |d| over its sigma along itself.
 double sigmas_of(const Vector3d& d, const Matrix3d& covariance) {
@@ -38,20 +39,14 @@ double largest_sigma(const Matrix3d& covariance) {
 }
 
 std::string extrinsic_text(const Calibration& calibration) {
-  const Vector3d& p = calibration.T_base_lidar.p;
   const Vector3d rpy = roll_pitch_yaw_of(calibration.T_base_lidar.q);
-  char text[400];
+  char text[200];
   std::snprintf(text,
                 sizeof text,
-                "robot.lidar_position_base_m [%.3f, %.3f, %.3f], lidar_roll_pitch_yaw_base_rad "
-                "[%.4f, %.4f, %.4f], sigma at most %.3f m and %.4f rad",
-                p.x(),
-                p.y(),
-                p.z(),
+                "robot.lidar_roll_pitch_yaw_base_rad [%.4f, %.4f, %.4f], sigma at most %.4f rad",
                 rpy.x(),
                 rpy.y(),
                 rpy.z(),
-                largest_sigma(calibration.extrinsic_covariance.topLeftCorner<3, 3>()),
                 largest_sigma(calibration.extrinsic_covariance.bottomRightCorner<3, 3>()));
   return text;
 }
@@ -100,22 +95,16 @@ void CalibrationReport::look_at_clock(const Calibration& calibration,
 void CalibrationReport::look_at_extrinsic(const Calibration& calibration,
                                           Nanoseconds stamp_ns,
                                           Events& events) {
-  const Matrix3d position = calibration.extrinsic_covariance.topLeftCorner<3, 3>();
   const Matrix3d rotation = calibration.extrinsic_covariance.bottomRightCorner<3, 3>();
-  const Vector3d shift_m = calibration.T_base_lidar.p - configured_T_base_lidar_.p;
   const Vector3d turn_rad =
       so3_log(configured_T_base_lidar_.q.conjugate() * calibration.T_base_lidar.q);
-  const bool wrong =
-      (turn_rad.norm() > kRotationWarning_rad &&
-       sigmas_of(turn_rad, rotation) > kExtrinsicSigmas) ||
-      (shift_m.norm() > kPositionWarning_m && sigmas_of(shift_m, position) > kExtrinsicSigmas);
-  if (wrong && !extrinsic_warned_) {
+  if (!extrinsic_warned_ && turn_rad.norm() > kRotationWarning_rad &&
+      sigmas_of(turn_rad, rotation) > kExtrinsicSigmas) {
     char text[160];
     std::snprintf(text,
                   sizeof text,
-                  "the LiDAR sits %.2f degrees and %.3f m from where the configuration says: ",
-                  turn_rad.norm() * 57.29577951,
-                  shift_m.norm());
+                  "the LiDAR is turned by %.2f degrees from what the configuration says: ",
+                  turn_rad.norm() * 57.29577951);
     events.push_back({Severity::kWarning,
                       stamp_ns,
                       "extrinsic_differs",

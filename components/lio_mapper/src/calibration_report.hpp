@@ -14,6 +14,7 @@ class CalibrationReport {
  public:
   CalibrationReport(const Config& config, const Pose& T_base_lidar)
       : estimates_extrinsic_(config.extrinsic.estimate),
+        rotation_sigma_rad_(config.extrinsic.rotation_sigma_rad),
         configured_time_offset_s_(config.sweep.time_offset_s),
         configured_T_base_lidar_(T_base_lidar) {}
 
@@ -25,6 +26,7 @@ class CalibrationReport {
   void look_at_extrinsic(const Calibration& calibration, Nanoseconds stamp_ns, Events& events);
 
   bool estimates_extrinsic_;
+  double rotation_sigma_rad_;
   double configured_time_offset_s_;
   Pose configured_T_base_lidar_;
   bool clock_known_{false};

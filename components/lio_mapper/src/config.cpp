@@ -237,7 +237,7 @@ void describe(Config& config, ConfigFields& fields) {
   fields.section("matching", "scan against local map", [&](ConfigFields& f) {
     describe_matching(config.matching, f);
   });
-  fields.section("extrinsic", "where the LiDAR sits on base_link", [&](ConfigFields& f) {
+  fields.section("extrinsic", "how the LiDAR is turned on base_link", [&](ConfigFields& f) {
     describe_extrinsic(config.extrinsic, f);
   });
   fields.section("local_map", "what scans are matched against", [&](ConfigFields& f) {

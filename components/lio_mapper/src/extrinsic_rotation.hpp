@@ -50,7 +50,7 @@ class ExtrinsicRotationEstimator {
   std::size_t windows_{0};
   std::size_t turns_{0};     ///< windows that told something
   double noise2_rad2_{0.0};  ///< of one attitude, mean over windows
-  double excess_;            ///< squared innovations of windows over what independent noise makes
+  double excess_;            ///< squared innovations of windows over what they should be
 };
 
 }  // namespace trigpoint::lio_mapper

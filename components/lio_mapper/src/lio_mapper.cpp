@@ -289,7 +289,7 @@ void LioMapper::Impl::report(const ScanOutcome& outcome, Output& output) {
   const InertialSample& newest = imu.samples().back();
   const State& state = filter->state();
   result.odometry = odometry_of(state,
-                                filter->covariance(),
+                                filter->stated_covariance(),
                                 filter->pose_covariance(),
                                 newest.gyro_radps,
                                 config.imu,

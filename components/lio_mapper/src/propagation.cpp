@@ -163,4 +163,12 @@ Path Path::ending_at(const Pose& T_odom_base) const {
   return path;
 }
 
+Path Path::seen_from(const Pose& T_base_other) const {
+  Path path = *this;
+  for (PathNode& node : path.nodes_) {
+    node.T_odom_base = node.T_odom_base * T_base_other;
+  }
+  return path;
+}
+
 }  // namespace trigpoint::lio_mapper

@@ -109,6 +109,9 @@ class Path {
   /// that, as for any process with independent increments.
   Path ending_at(const Pose& T_odom_base) const;
 
+  /// The path of another place on the robot, which lies at `T_base_other`; turn rates stay in base.
+  Path seen_from(const Pose& T_base_other) const;
+
  private:
   std::vector<PathNode> nodes_;
 };

@@ -240,6 +240,13 @@ Resumption::Found Resumption::compose(const StartResult& start,
   if (!options_.frozen_map) {
     add_drift_noise(drift_rate(config_.drift), moved_m, state, checkpoint_.aligned, P);
   }
+  if (config_.extrinsic.estimate) {
+    // What the session had found of the LiDAR's turn is to be found again, against its gravity.
+    DriftRate forgotten;
+    forgotten.tilt_rad2 = config_.extrinsic.rotation_sigma_rad *
+                          config_.extrinsic.rotation_sigma_rad * Eigen::Matrix2d::Identity();
+    add_drift_noise(forgotten, 1.0, state, checkpoint_.aligned, P);
+  }
   make_symmetric(P);
   found.past.aligned = checkpoint_.aligned;
   found.past.distance_m = checkpoint_.distance_m + (options_.frozen_map ? 0.0 : moved_m);

@@ -87,6 +87,17 @@ std::optional<Eigen::Quaterniond> attitude_of_scan(const UpdateResult& result) {
   return (result.measured_at.q * so3_exp(turn_rad)).normalized();
 }
 
+/// What `more` knows beyond `known`, along the axes along which it knows more.
+Matrix6d beyond(const Matrix6d& known, const Matrix6d& more) {
+  const Eigen::LLT<Matrix6d> root(known + kUnseen * Matrix6d::Identity());
+  const Matrix6d half = root.matrixL().solve(more);
+  const Matrix6d times_known = root.matrixL().solve(half.transpose());
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> axes(times_known);
+  const Matrix6d directions = root.matrixL() * axes.eigenvectors();
+  const Vector6d excess = (axes.eigenvalues().array() - 1.0).max(0.0);
+  return directions * excess.asDiagonal() * directions.transpose();
+}
+
 /// By how much a pose at `p` moves with a displacement of odom that is expressed about its origin,
 /// ROS order; -p is the way back.
 Matrix6d transport(const Vector3d& p_odom_m) {
@@ -219,7 +230,7 @@ UpdateResult ScanFilter::match(const Prediction& prediction,
     PoseInformation known;
     known.information = matcher.information_by_patches();
     doubt_bent_map(prediction.covariance, known);
-    known_by_patches_ = known.information;
+    known_by_patches_ = beyond(result.measured.information, known.information);
   }
   outcome.matches = result.count;
   outcome.iterations = result.iterations;
@@ -330,15 +341,22 @@ void ScanFilter::turn_extrinsic(Prediction& prediction) {
   const double turn_rad =
       (extrinsic_rotation_.certain_turn_base_rad() - extrinsic_taken_rad_).norm();
   if (turn_rad > kLeastCorrection_rad) {
-    // What follows is compared with the gyro anew.
-    learn_from(windows_.interrupt());
+    windows_.interrupt();  // what follows is compared with the gyro anew
     extrinsic_taken_rad_ = extrinsic_rotation_.certain_turn_base_rad();
-    const Pose T_odom_lidar = state.T_odom_base * state.T_base_lidar;
-    const Eigen::Quaterniond before = state.T_odom_base.q;
+    const State before = state;
     state.T_base_lidar.q = (so3_exp(extrinsic_taken_rad_) * T_base_lidar_.q).normalized();
-    state.T_odom_base = T_odom_lidar * state.T_base_lidar.inverse();
-    state.gravity_odom_mps2 = state.T_odom_base.q * before.conjugate() * state.gravity_odom_mps2;
-    prediction.covariance.diagonal().segment<2>(error::kGravity).array() += turn_rad * turn_rad;
+    const Pose T_old_new = before.T_base_lidar * state.T_base_lidar.inverse();
+    prediction.path = prediction.path.seen_from(T_old_new);
+    state.T_odom_base = before.T_odom_base * T_old_new;
+    state.gravity_odom_mps2 =
+        state.T_odom_base.q * before.T_odom_base.q.conjugate() * before.gravity_odom_mps2;
+    // The LiDAR stays in map, too.
+    const Vector3d lidar_odom_m = state.T_odom_base * state.T_base_lidar.p;
+    state.T_map_odom.p +=
+        before.placement().pose() * lidar_odom_m - state.placement().pose() * lidar_odom_m;
+    DriftRate open;
+    open.tilt_rad2 = turn_rad * turn_rad * Eigen::Matrix2d::Identity();
+    add_drift_noise(open, 1.0, state, aligned_, prediction.covariance);
   }
   const Matrix3d R_lidar_base = state.T_base_lidar.q.toRotationMatrix().transpose();
   prediction.covariance.block<3, 3>(error::kExtrinsicRotation, error::kExtrinsicRotation) =
@@ -382,6 +400,8 @@ ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu, const 
     record.before_rows = result.state;
     record.covariance_before_rows = result.covariance;
     record.transition = result.transition * prediction.transition;
+  } else {
+    learn_from(windows_.interrupt());
   }
   record.path = std::move(prediction.path);
   history_.push(std::move(record));

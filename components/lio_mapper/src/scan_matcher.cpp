@@ -259,8 +259,7 @@ PoseInformation ScanMatcher::weighed(PoseInformation sum, double least_scatter) 
   const auto most = static_cast<std::size_t>(config_.max_patches);
   const double scale =
       static_cast<double>(std::min(count_patches(), most)) / static_cast<double>(sum.count);
-  // Planes that go through the points that they explain are no witnesses that patches differ.
-  scratch_.least_scatter = also_nearest_ ? 1.0 / scale : least_scatter;
+  scratch_.least_scatter = least_scatter;
   scratch_.kept = root_trust * by;
   sum.information = (scale * scratch_.kept * sum.information * scratch_.kept.transpose()).eval();
   sum.gradient = (scale * root_trust * scratch_.kept * sum.gradient).eval();

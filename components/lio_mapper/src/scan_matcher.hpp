@@ -42,7 +42,8 @@ class ScanMatcher {
   /// is drawn: residuals in one patch share the map's errors, and by how much is seen in what the
   /// patches pull at the optimum (the covariance that is robust to clusters [K.-Y. Liang, S. L.
   /// Zeger, "Longitudinal data analysis using generalized linear models", Biometrika 73, 1986]).
-  /// None along axes that fewer than four patches hold. 1/m^2 and 1/rad^2, in the error's axes.
+  /// None where nearest points were matched, and along axes that fewer than four patches hold.
+  /// 1/m^2 and 1/rad^2, in the error's axes.
   Matrix6d information_by_patches() const;
 
   /// Share of the points that lie within `distance_m` of their plane at the last linearisation.

@@ -10,6 +10,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstring>
 #include <functional>
 
 namespace trigpoint::lio_mapper {
@@ -108,17 +110,44 @@ TEST(LioMapper, drives_twenty_seconds_through_a_hall_of_planes_within_two_centim
   EXPECT_GT(run.imu_rate, 1700);  // 100 Hz but for the start
 }
 
+/// The points of a LiDAR that is turned by a quarter to the left.
+void see_turned(PointCloudMessage& cloud) {
+  for (std::size_t at = 0; at < cloud.data.size(); at += cloud.point_step) {
+    float x = 0.0F;
+    float y = 0.0F;
+    std::memcpy(&x, &cloud.data[at], sizeof x);
+    std::memcpy(&y, &cloud.data[at + sizeof x], sizeof y);
+    const float minus_x = -x;
+    std::memcpy(&cloud.data[at], &y, sizeof y);
+    std::memcpy(&cloud.data[at + sizeof x], &minus_x, sizeof minus_x);
+  }
+}
+
 TEST(LioMapper, finds_how_the_lidar_is_turned_and_what_was_right_stays_right) {
   constexpr double kTolerance_rad = 4e-3;
   const RoomDrive room;
-  for (const Eigen::Vector3d& wrong_rad :
-       {Eigen::Vector3d(0.02, -0.015, 0.0), Eigen::Vector3d(0.0, 0.0, 0.0)}) {
+
+  struct Mounting {
+    Eigen::Vector3d wrong_rad;
+    bool turned;
+  };
+
+  for (const auto& [wrong_rad, turned] : {Mounting{{0.02, -0.015, 0.0}, false},
+                                          Mounting{{0.0, 0.0, 0.0}, false},
+                                          Mounting{{0.02, -0.015, 0.0}, true}}) {
     RobotConfig robot;
+    robot.lidar_roll_pitch_yaw_base_rad.z() = turned ? std::acos(0.0) : 0.0;
     const Eigen::Quaterniond q_true = robot.T_base_lidar().q;
     robot.lidar_roll_pitch_yaw_base_rad += wrong_rad;
     Config config;
     config.extrinsic.estimate = true;
     Drive run(config, robot);
+    if (turned) {
+      run.on_cloud = [](int, PointCloudMessage& cloud) {
+        see_turned(cloud);
+        return true;
+      };
+    }
     run.drive(room, 0, 300);
     run.take(run.mapper.finish());
     const Calibration found = run.mapper.calibration();
@@ -130,6 +159,44 @@ TEST(LioMapper, finds_how_the_lidar_is_turned_and_what_was_right_stays_right) {
     EXPECT_LT(error_rad.dot(covariance.ldlt().solve(error_rad)), 16.3);  // chi-square of 3, 0.1 %
     EXPECT_EQ(run.said("extrinsic_differs"), !wrong_rad.isZero());
     EXPECT_EQ(run.mapper.status().health, LioHealth::kOk);
+  }
+}
+
+TEST(LioMapper, stays_in_map_when_it_takes_over_how_the_lidar_is_turned) {
+  const RoomDrive room;
+  RobotConfig robot;
+  robot.lidar_roll_pitch_yaw_base_rad += Eigen::Vector3d(0.02, -0.015, 0.0);
+  Config config;
+  config.extrinsic.estimate = true;
+  Drive run(config, robot);
+  run.after_sweep = [&](Nanoseconds begin_ns) {
+    if (!run.scans.empty() && !run.mapper.status().aligned) {
+      StateUpdate update;
+      update.fix_stamp_ns = begin_ns - 150'000'000;
+      update.position_map_m = room.pose_at(to_seconds(update.fix_stamp_ns - kEpoch_ns)).p;
+      update.covariance_map_m2 = 0.02 * 0.02 * Eigen::Matrix3d::Identity();
+      update.decision.fill(AxisDecision::kFused);
+      update.first_alignment = Alignment{0, {}, 1e-4 * Eigen::Matrix4d::Identity()};
+      run.take(run.mapper.on_state_update(update));
+    }
+  };
+  run.drive(room, 0, 200);
+  ASSERT_TRUE(run.mapper.status().aligned);
+  ASSERT_LT(so3_log(run.mapper.calibration().T_base_lidar.q).norm(), 0.005);  // of 0.025
+  constexpr double kLargestStep_m = 0.03;
+  for (std::size_t i = 1; i < run.scans.size(); ++i) {
+    const auto in_map = [&](const ScanResult& scan) {
+      return scan.status.T_map_odom.pose() * scan.odometry.T_frame_child.p;
+    };
+    const auto truth = [&](const ScanResult& scan) {
+      return room.pose_at(to_seconds(scan.odometry.stamp_ns - kEpoch_ns)).p;
+    };
+    if (run.scans[i - 1].status.aligned) {
+      const Eigen::Vector3d step_m = in_map(run.scans[i]) - in_map(run.scans[i - 1]);
+      const Eigen::Vector3d true_m = truth(run.scans[i]) - truth(run.scans[i - 1]);
+      EXPECT_NEAR(step_m.norm(), true_m.norm(), kLargestStep_m) << i;
+      EXPECT_NEAR(step_m.z(), true_m.z(), kLargestStep_m) << i;
+    }
   }
 }
 
