@@ -102,7 +102,7 @@ struct DriftConfig {
   double yaw_sigma_rad_sqrtm{2e-5};
   double tilt_sigma_rad_sqrtm{2e-5};
   /// Share of the pose's covariance relative to the local map that the map inherits per metre.
-  double map_renewal_per_m{0.33};
+  double map_renewal_per_m{0.25};
   /// Random walk of the tilt of odom against gravity that moves the robot along an axis which scans
   /// do not hold.
   double blind_tilt_rad_sqrts{1.6e-3};
