@@ -334,8 +334,8 @@ void ScanFilter::learn_from(const AttitudeWindow& window) {
 }
 
 /// Takes what is known of the extrinsic by now. The LiDAR stays where it is in odom, as scans hold
-/// it there; base turns under it. What the accelerometer sees turns along, but how far gravity
-/// itself had followed the wrong extrinsic is open.
+/// it there; base turns under it. The accelerometer had been at odds with it: by how much that went
+/// into gravity, by which the map is tilted, and how much into the bias, is open.
 void ScanFilter::turn_extrinsic(Prediction& prediction) {
   State& state = prediction.state;
   const double turn_rad =
@@ -348,15 +348,12 @@ void ScanFilter::turn_extrinsic(Prediction& prediction) {
     const Pose T_old_new = before.T_base_lidar * state.T_base_lidar.inverse();
     prediction.path = prediction.path.seen_from(T_old_new);
     state.T_odom_base = before.T_odom_base * T_old_new;
-    state.gravity_odom_mps2 =
-        state.T_odom_base.q * before.T_odom_base.q.conjugate() * before.gravity_odom_mps2;
-    // The LiDAR stays in map, too.
-    const Vector3d lidar_odom_m = state.T_odom_base * state.T_base_lidar.p;
-    state.T_map_odom.p +=
-        before.placement().pose() * lidar_odom_m - state.placement().pose() * lidar_odom_m;
     DriftRate open;
     open.tilt_rad2 = turn_rad * turn_rad * Eigen::Matrix2d::Identity();
     add_drift_noise(open, 1.0, state, aligned_, prediction.covariance);
+    const double accel_mps2 = turn_rad * state.gravity_odom_mps2.norm();
+    prediction.covariance.diagonal().segment<3>(error::kAccelBias).array() +=
+        accel_mps2 * accel_mps2;
   }
   const Matrix3d R_lidar_base = state.T_base_lidar.q.toRotationMatrix().transpose();
   prediction.covariance.block<3, 3>(error::kExtrinsicRotation, error::kExtrinsicRotation) =
