@@ -23,7 +23,7 @@ constexpr std::size_t kFewestAttitudes = 4;
 /// Noise and excess are means over about so many windows.
 constexpr double kMemory_windows = 15.0;
 /// A turn is certain when its sigma is less than this share of that of the configuration.
-constexpr double kCertain = 0.25;
+constexpr double kCertain = 1.0 / 3.0;
 /// An innovation beyond this many sigmas counts as that many.
 constexpr double kInnovationClip = 3.0;
 /// Windows are compared about an axis that on average left the line through its way by so much, as
