@@ -21,21 +21,6 @@ constexpr double kMostInherited_rad = 0.003;
 /// One scan that leaves the position more open than this does not hold the velocity.
 constexpr double kHeld_m = 0.3;
 
-/// Adds to `covariance` tilts of odom against gravity about odom's x and y, as long as it is nearly
-/// level. Once there is an alignment they turn it about the robot.
-void add_tilt_noise(const Eigen::Matrix2d& tilt_rad2,
-                    const State& state,
-                    bool aligned,
-                    ErrorMatrix& covariance) {
-  Eigen::Matrix<double, error::kSize, 2> tilt = Eigen::Matrix<double, error::kSize, 2>::Zero();
-  tilt.middleRows<2>(error::kGravity).setIdentity();
-  if (aligned) {
-    tilt.middleRows<3>(error::kPositionMapOdom) =
-        -placed_point_by_gravity(state, state.T_odom_base.p);
-  }
-  covariance += tilt * tilt_rad2 * tilt.transpose();
-}
-
 }  // namespace
 
 DriftRate drift_rate(const DriftConfig& drift, const Matrix6d& local) {
@@ -68,6 +53,19 @@ Matrix4d drift_noise(const DriftRate& rate,
   noise.bottomRightCorner<3, 3>() +=
       distance_m * R_frame_odom * rate.position_m2 * R_frame_odom.transpose();
   return noise;
+}
+
+void add_tilt_noise(const Eigen::Matrix2d& tilt_rad2,
+                    const State& state,
+                    bool aligned,
+                    ErrorMatrix& covariance) {
+  Eigen::Matrix<double, error::kSize, 2> tilt = Eigen::Matrix<double, error::kSize, 2>::Zero();
+  tilt.middleRows<2>(error::kGravity).setIdentity();
+  if (aligned) {
+    tilt.middleRows<3>(error::kPositionMapOdom) =
+        -placed_point_by_gravity(state, state.T_odom_base.p);
+  }
+  covariance += tilt * tilt_rad2 * tilt.transpose();
 }
 
 void add_drift_noise(const DriftRate& rate,

@@ -41,6 +41,13 @@ void add_drift_noise(const DriftRate& rate,
                      bool aligned,
                      ErrorMatrix& covariance);
 
+/// Adds to `covariance` tilts of odom against gravity about odom's x and y, as long as it is nearly
+/// level. Once there is an alignment they turn it about the robot.
+void add_tilt_noise(const Eigen::Matrix2d& tilt_rad2,
+                    const State& state,
+                    bool aligned,
+                    ErrorMatrix& covariance);
+
 /// Share, 0 to 1 along each axis of odom, by which a scan with this information (1/m^2) leaves the
 /// position so open that it does not hold the velocity either.
 Eigen::Matrix3d blindness(const Eigen::Matrix3d& position_information);

@@ -16,8 +16,8 @@ using Eigen::Vector3d;
 
 namespace {
 
-/// Neighbouring scans share the map's errors: attitudes of so long, a window, count as one, and more
-/// of them where windows differ by more.
+/// Neighbouring scans share the map's errors: attitudes of so long, a window, count as one, and
+/// more of them where windows differ by more.
 constexpr double kShared_s = 3.0;
 constexpr std::size_t kFewestAttitudes = 4;
 /// Noise and excess are means over about so many windows.

@@ -242,10 +242,9 @@ Resumption::Found Resumption::compose(const StartResult& start,
   }
   if (config_.extrinsic.estimate) {
     // What the session had found of the LiDAR's turn is to be found again, against its gravity.
-    DriftRate forgotten;
-    forgotten.tilt_rad2 = config_.extrinsic.rotation_sigma_rad *
-                          config_.extrinsic.rotation_sigma_rad * Eigen::Matrix2d::Identity();
-    add_drift_noise(forgotten, 1.0, state, checkpoint_.aligned, P);
+    const double sigma_rad = config_.extrinsic.rotation_sigma_rad;
+    add_tilt_noise(
+        sigma_rad * sigma_rad * Eigen::Matrix2d::Identity(), state, checkpoint_.aligned, P);
   }
   make_symmetric(P);
   found.past.aligned = checkpoint_.aligned;

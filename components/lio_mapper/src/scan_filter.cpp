@@ -90,9 +90,7 @@ std::optional<Eigen::Quaterniond> attitude_of_scan(const UpdateResult& result) {
 /// What `more` knows beyond `known`, along the axes along which it knows more.
 Matrix6d beyond(const Matrix6d& known, const Matrix6d& more) {
   const Eigen::LLT<Matrix6d> root(known + kUnseen * Matrix6d::Identity());
-  const Matrix6d half = root.matrixL().solve(more);
-  const Matrix6d times_known = root.matrixL().solve(half.transpose());
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> axes(times_known);
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> axes(whitened(root, more));
   const Matrix6d directions = root.matrixL() * axes.eigenvectors();
   const Vector6d excess = (axes.eigenvalues().array() - 1.0).max(0.0);
   return directions * excess.asDiagonal() * directions.transpose();
@@ -348,9 +346,8 @@ void ScanFilter::turn_extrinsic(Prediction& prediction) {
     const Pose T_old_new = before.T_base_lidar * state.T_base_lidar.inverse();
     prediction.path = prediction.path.seen_from(T_old_new);
     state.T_odom_base = before.T_odom_base * T_old_new;
-    DriftRate open;
-    open.tilt_rad2 = turn_rad * turn_rad * Eigen::Matrix2d::Identity();
-    add_drift_noise(open, 1.0, state, aligned_, prediction.covariance);
+    add_tilt_noise(
+        turn_rad * turn_rad * Eigen::Matrix2d::Identity(), state, aligned_, prediction.covariance);
     const double accel_mps2 = turn_rad * state.gravity_odom_mps2.norm();
     prediction.covariance.diagonal().segment<3>(error::kAccelBias).array() +=
         accel_mps2 * accel_mps2;

@@ -89,12 +89,10 @@ void allow_for_scatter(const Matrix6d& scatter,
                        const Vector6d& step,
                        double least,
                        PoseInformation& sum) {
-  using Matrix = Matrix6d;
   // What no residual sees scatters as the root says, neither more nor less.
-  const Matrix half = root.matrixL().solve((scatter + kUnseen * Matrix::Identity()).eval());
-  const Matrix times_stated = root.matrixL().solve(half.transpose());
-  const Eigen::SelfAdjointEigenSolver<Matrix> eigen(times_stated);
-  const Matrix directions = root.matrixL() * eigen.eigenvectors();
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(
+      whitened(root, scatter + kUnseen * Matrix6d::Identity()));
+  const Matrix6d directions = root.matrixL() * eigen.eigenvectors();
   sum.information = directions * eigen.eigenvalues().cwiseMax(least).cwiseInverse().asDiagonal() *
                     directions.transpose();
   sum.gradient = -(sum.information * step).eval();

@@ -8,6 +8,7 @@
 #include "iterated_update.hpp"
 #include "local_map.hpp"
 #include "workers.hpp"
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include <algorithm>
@@ -20,6 +21,12 @@ namespace trigpoint::lio_mapper {
 
 /// Information of directions that no residual sees, where an inverse is asked for.
 inline constexpr double kUnseen = 1e-3;
+
+/// L^-1 M L^-T: M where what `root` = L L^T is the root of is the identity.
+inline Matrix6d whitened(const Eigen::LLT<Matrix6d>& root, const Matrix6d& matrix) {
+  const Matrix6d half = root.matrixL().solve(matrix);
+  return root.matrixL().solve(half.transpose());
+}
 
 /// Residuals of one scan against the planes of a local map: r = n . (R p + t) + d, FAST-LIO2
 /// eq. 12. Sums the normal equations directly while it goes through the points.

@@ -53,8 +53,7 @@ Matrix6d ScanMatcher::information_by_patches() const {
   std::vector<Matrix6d> shares;
   shares.reserve(patches.size());
   for (const PatchSum& patch : patches) {
-    const Matrix6d half = root.matrixL().solve(patch.information);
-    shares.push_back(root.matrixL().solve(half.transpose()));
+    shares.push_back(whitened(root, patch.information));
     const Vector6d left_out = (Matrix6d::Identity() - shares.back())
                                   .ldlt()
                                   .solve(root.matrixL().solve(patch.pull).eval());
