@@ -6,6 +6,7 @@
 
 #include "../network.hpp"
 #include "bulk_queue.hpp"
+#include "discovery_turns.hpp"
 #include "limited_transport.hpp"
 #include <fastdds/rtps/flowcontrol/FlowControllerDescriptor.hpp>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
@@ -13,6 +14,7 @@
 #include <fastrtps/utils/IPLocator.h>
 
 #include <memory>
+#include <mutex>
 
 namespace trigpoint::bus::fastdds {
 
@@ -105,6 +107,13 @@ void use_discovery_server(eprosima::fastdds::dds::DomainParticipantQos& qos, con
   discovery.m_DiscoveryServers.push_back(server);
 }
 
+void take_turns_in_discovery(eprosima::fastdds::dds::DomainParticipantQos& qos) {
+  const auto turn = std::make_shared<std::mutex>();
+  for (auto& transport : qos.transport().user_transports) {
+    transport = one_discovery_at_a_time(transport, turn);
+  }
+}
+
 void add_pacing(eprosima::fastdds::dds::DomainParticipantQos& qos, const Pacing& wanted) {
   auto pacing = std::make_shared<FlowControllerDescriptor>();
   pacing->name = kPacing;
@@ -147,6 +156,9 @@ void set_transport(eprosima::fastdds::dds::DomainParticipantQos& qos,
   qos.transport().user_transports.push_back(limited(udp, bulk, incoming));
   if (config.shared_memory) {
     qos.transport().user_transports.push_back(shared_memory());
+  }
+  if (!config.security_folder.empty()) {
+    take_turns_in_discovery(qos);
   }
   auto& discovery = qos.wire_protocol().builtin.discovery_config;
   discovery.leaseDuration = eprosima::fastrtps::Duration_t(config.lease_s);
