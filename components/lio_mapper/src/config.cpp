@@ -129,10 +129,15 @@ void describe_extrinsic(ExtrinsicConfig& c, ConfigFields& f) {
   f.flag("estimate",
          c.estimate,
          "whether robot.lidar_roll_pitch_yaw_base_rad is where the estimate starts (true), which "
-         "turns teach about the axes across them, or taken as exact (false)");
+         "turns teach about the axes across them, or what holds (false)");
   f.number("rotation_sigma_rad",
            c.rotation_sigma_rad,
-           "how well the configured rotation is known, each axis",
+           "how well the configured rotation is known, each axis, where it is estimated",
+           kNotNegative);
+  f.number("level_sigma_rad",
+           c.level_sigma_rad,
+           "how far the LiDAR may lean against the accelerometer where the rotation is not "
+           "estimated: odom's level, which GPS heights and turns correct, is less certain by that",
            kNotNegative);
   f.number("position_sigma_m",
            c.position_sigma_m,

@@ -56,28 +56,6 @@ void add_row(const Vector6d& h,
   add_noise(h.segment<3>(error::kPosition), weight * plane.tilt2_rad2, sum.noise);
 }
 
-/// Normals are measured too. Along a tunnel none has a true component, but their noise has one, and
-/// its squares add up to information that is none: least squares with noisy regressors, which holds
-/// the estimate back at the prediction and makes it look certain [W. A. Fuller, Measurement Error
-/// Models, 1987, ch. 1]. Along each principal axis of the position's information A, with N of it
-/// noise and f = 1 - N / A: the solution g / (A - N) has the variance A / (A - N)^2, which is that
-/// of the information f^2 A with the gradient f g.
-/// Along no axis is more left than `pulled_back` says.
-Matrix6d noise_free_share(const PoseInformation& sum, const Eigen::Matrix3d& pulled_back) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(sum.information.topLeftCorner<3, 3>());
-  Eigen::Matrix3d keep = Eigen::Matrix3d::Zero();
-  for (int i = 0; i < 3; ++i) {
-    const Vector3d axis = axes.eigenvectors().col(i);
-    const double noise = axis.dot(sum.noise * axis);
-    const double share = std::min(std::max(0.0, 1.0 - noise / (axes.eigenvalues()[i] + 1e-12)),
-                                  axis.dot(pulled_back * axis));
-    keep += share * axis * axis.transpose();
-  }
-  Matrix6d by = Matrix6d::Identity();
-  by.topLeftCorner<3, 3>() = keep;
-  return by;
-}
-
 /// Where the residuals at the optimum scatter more than their variances say, as those of crowns do,
 /// their estimate is as much less certain: with A = L L^T and B = sum w^2 r^2 h h^T its covariance
 /// is A^-1 B A^-1 [H. White, "A heteroskedasticity-consistent covariance matrix estimator", 1980],
@@ -241,15 +219,47 @@ PoseInformation ScanMatcher::sum_of_all(const Viewpoint& view) {
   return sum;
 }
 
+/// Normals are measured too. Along a tunnel none has a true component, but their noise has one, and
+/// its squares add up to information that is none: least squares with noisy regressors, which holds
+/// the estimate back at the prediction and makes it look certain [W. A. Fuller, Measurement Error
+/// Models, 1987, ch. 1]. Along each principal axis of the position's information A, with N of it
+/// noise and f = 1 - N / A: the solution g / (A - N) has the variance A / (A - N)^2, which is that
+/// of the information f^2 A with the gradient f g. Where axes were judged, it is those, and along
+/// none is more left than was found there.
+Matrix6d ScanMatcher::noise_free_share(const PoseInformation& sum) const {
+  const Eigen::Matrix3d position = sum.information.topLeftCorner<3, 3>();
+  const Eigen::Matrix3d axes =
+      open_.axes_odom ? *open_.axes_odom
+                      : Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(position).eigenvectors();
+  Eigen::Matrix3d keep = Eigen::Matrix3d::Zero();
+  for (int i = 0; i < 3; ++i) {
+    const Vector3d axis = axes.col(i);
+    const double noise = axis.dot(sum.noise * axis);
+    const double share = std::min(std::max(0.0, 1.0 - noise / (axis.dot(position * axis) + 1e-12)),
+                                  open_.pulled_back[i]);
+    keep += share * axis * axis.transpose();
+  }
+  Matrix6d by = Matrix6d::Identity();
+  by.topLeftCorner<3, 3>() = keep;
+  return by;
+}
+
 /// What the sum over all residuals is worth.
 PoseInformation ScanMatcher::weighed(PoseInformation sum, double least_scatter) {
   if (sum.count == 0) {
     scratch_.kept.setZero();
     return sum;
   }
-  const Matrix6d by = noise_free_share(sum, open_.pulled_back);
-  Matrix6d root_trust = Matrix6d::Identity();
-  root_trust.topLeftCorner<3, 3>() = open_.root_trust;
+  const Matrix6d by = noise_free_share(sum);
+  const auto along_axes = [this](const Vector3d& parts) {
+    Matrix6d all = Matrix6d::Identity();
+    if (open_.axes_odom) {
+      all.topLeftCorner<3, 3>() =
+          *open_.axes_odom * parts.asDiagonal() * open_.axes_odom->transpose();
+    }
+    return all;
+  };
+  const Matrix6d root_trust = along_axes(open_.root_trust);
   const Eigen::LLT<Matrix6d> root(sum.information + kUnseen * Matrix6d::Identity());
   scratch_.unweighed = sum.information;
   scratch_.step = -root.solve(sum.gradient);
@@ -260,7 +270,8 @@ PoseInformation ScanMatcher::weighed(PoseInformation sum, double least_scatter) 
   scratch_.least_scatter = least_scatter;
   scratch_.kept = root_trust * by;
   sum.information = (scale * scratch_.kept * sum.information * scratch_.kept.transpose()).eval();
-  sum.gradient = (scale * root_trust * scratch_.kept * sum.gradient).eval();
+  sum.gradient =
+      (scale * root_trust * scratch_.kept * along_axes(open_.certain) * sum.gradient).eval();
   sum.noise *= scale;
   return sum;
 }

@@ -105,10 +105,12 @@ class ScanMatcher {
     double sigma;
   };
 
-  /// Matrices over odom's axes; the identity along those that are not open.
+  /// What was judged axis by axis; ones along those that are not open.
   struct OpenAxes {
-    Eigen::Matrix3d pulled_back{Eigen::Matrix3d::Identity()};  ///< share of the promised pull
-    Eigen::Matrix3d root_trust{Eigen::Matrix3d::Identity()};   ///< root of the share believed
+    std::optional<Eigen::Matrix3d> axes_odom;              ///< columns; none before it was judged
+    Eigen::Vector3d pulled_back{Eigen::Vector3d::Ones()};  ///< certain share of the promised pull
+    Eigen::Vector3d certain{Eigen::Vector3d::Ones()};      ///< part of the share that is certain
+    Eigen::Vector3d root_trust{Eigen::Vector3d::Ones()};   ///< root of the share believed
   };
 
   using Ask = bool (LocalMap::*)(const Eigen::Vector3d&, PlaneMatch&) const;
@@ -132,6 +134,8 @@ class ScanMatcher {
                  std::vector<Pull>& by_patch);
   static Share share_of(const std::vector<Pull>& by_patch);
   double trust_in(const Eigen::Vector3d& axis_odom, std::size_t cells) const;
+  Eigen::Matrix3d axes_of_surfaces(const Eigen::Matrix3d& information) const;
+  Matrix6d noise_free_share(const PoseInformation& sum) const;
   void judge_open_axes(const Viewpoint& view, const Eigen::Matrix3d& information);
   std::size_t number_cubes(double side_m, std::uint32_t Residual::*number);
   std::size_t count_patches();

@@ -33,6 +33,8 @@ constexpr double kCertainShare_sigmas = 2.0;
 /// What is vague is believed when at least this share of the pull is certain: three posts in a
 /// field pull back all that they promise, crowns and rings on a ceiling a third.
 constexpr double kMostlyPulled = 0.5;
+/// In the choice of axes.
+constexpr double kSaidByAll = 0.01;
 /// Of the promise, where one patch holds the rest.
 constexpr double kLeastPromise = 1e-3;
 
@@ -130,37 +132,53 @@ ScanMatcher::Share ScanMatcher::share_of(const std::vector<Pull>& by_patch) {
   return {share, std::sqrt((patches - 1.0) / patches * squares)};
 }
 
+/// The principal axes of what surfaces say of the position. Those of all information lean where
+/// planes through nearest points are false: along a tunnel towards its walls, whose true pull then
+/// vouches for the false one. Where surfaces say next to nothing, all of it decides.
+Eigen::Matrix3d ScanMatcher::axes_of_surfaces(const Eigen::Matrix3d& information) const {
+  Eigen::Matrix3d said = kSaidByAll * information;
+  for (std::size_t i = 0; i < residuals_.size(); ++i) {
+    const Residual& r = residuals_[i];
+    if (found_[i] == Found::kPlane && !r.is_of_nearest) {
+      said += r.weight * r.plane.normal * r.plane.normal.transpose();
+    }
+  }
+  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(said).eigenvectors();
+}
+
 /// Where surfaces are volumes, as crowns are, or planes lie as chance and the rings' pattern lay
 /// them, a scan that is moved finds other planes beside each point and is content: residuals that
 /// are linearised promise a pull back that does not come, and hold the estimate at its prediction.
 /// (Asked only where nearest points were matched: surfaces alone are held to be some.) Along each
 /// axis that is open: by how much of what A promises the gradient really changes between two
 /// displaced places, the secant f A in place of the tangent A. The solution is then g / (f A), with
-/// the information f^2 A, as for noisy normals.
+/// the information f^2 A, as for noisy normals; the information with the part of f that is certain,
+/// the solution with f itself, or the less is certain the farther it would go.
 void ScanMatcher::judge_open_axes(const Viewpoint& view, const Eigen::Matrix3d& information) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(information);
+  open_.axes_odom = axes_of_surfaces(information);
   const std::size_t cells = number_cubes(kCell_m, &Residual::cell);
-  open_.pulled_back.setZero();
-  open_.root_trust.setZero();
   for (int i = 0; i < 3; ++i) {
-    const Vector3d axis = axes.eigenvectors().col(i);
+    const Vector3d axis = open_.axes_odom->col(i);
     double along = 1.0;
     double trust = 1.0;
-    const double promised_here = axes.eigenvalues()[i];
+    double certain = 1.0;
+    const double promised_here = axis.dot(information * axis);
     if (promised_here > kUnseen && promised_here < 1.0 / (kOpenPosition_m * kOpenPosition_m)) {
       std::vector<Pull> by_patch(patches_.size());
       add_pulls(view, axis, kDisplaced_m, by_patch);
       add_pulls(view, axis, -kDisplaced_m, by_patch);
       const Share pulled = share_of(by_patch);
       along = std::clamp(pulled.share - kCertainShare_sigmas * pulled.sigma, 0.0, 1.0);
+      certain = along > 0.0 ? std::min(1.0, along / pulled.share) : 1.0;
       trust = trust_in(axis, cells);
       // Vaguer than the displacement within which matches hold, and most of it not even certain.
       const double left = trust * along * along * promised_here;
       const bool is_vague = left * kDisplaced_m * kDisplaced_m < 1.0;
       trust = is_vague && along < kMostlyPulled ? 0.0 : trust;
     }
-    open_.pulled_back += along * axis * axis.transpose();
-    open_.root_trust += std::sqrt(trust) * axis * axis.transpose();
+    open_.pulled_back[i] = along;
+    open_.certain[i] = certain;
+    open_.root_trust[i] = std::sqrt(trust);
   }
 }
 

@@ -193,6 +193,23 @@ Nanoseconds start_stamp(const ImuBuffer& imu, const std::deque<Sweep>& sweeps) {
   return std::max(imu.oldest_ns(), sweeps.front().begin_ns);
 }
 
+/// What the accelerometer's bias is not known by, odom's level is not known by either.
+void add_bias_with_tilt(const Matrix3d& covariance_m2ps4, InitialState& initial) {
+  const State& state = initial.state;
+  // dg = R db, and dg = D e with D = -[g]x B, D^T D = |g|^2 I, so e = D^T R db / |g|^2.
+  const Eigen::Matrix<double, 3, 2> D =
+      -hat(state.gravity_odom_mps2) * gravity_tangent(state.gravity_odom_mps2);
+  const Eigen::Matrix<double, 2, 3> by_bias = D.transpose() *
+                                              state.T_odom_base.q.toRotationMatrix() /
+                                              (kStandardGravity_mps2 * kStandardGravity_mps2);
+  const Eigen::Matrix<double, 2, 3> cross = by_bias * covariance_m2ps4;
+  ErrorMatrix& P = initial.covariance;
+  P.block<3, 3>(error::kAccelBias, error::kAccelBias) += covariance_m2ps4;
+  P.block<2, 2>(error::kGravity, error::kGravity) += cross * by_bias.transpose();
+  P.block<2, 3>(error::kGravity, error::kAccelBias) += cross;
+  P.block<3, 2>(error::kAccelBias, error::kGravity) += cross.transpose();
+}
+
 }  // namespace
 
 ImuSummary summarize(const ImuBuffer& imu, Nanoseconds from_ns, Nanoseconds to_ns) {
@@ -270,6 +287,13 @@ bool looks_at_rest(const ImuSummary& summary) {
          summary.force_change_mps2 < kRestForceChange_mps2;
 }
 
+void add_unknown_mounting(double sigma_rad, InitialState& initial) {
+  const Vector3d up_base = initial.state.T_odom_base.q.conjugate() * Vector3d::UnitZ();
+  const double force_mps2 = sigma_rad * kStandardGravity_mps2;
+  add_bias_with_tilt(
+      force_mps2 * force_mps2 * (Matrix3d::Identity() - up_base * up_base.transpose()), initial);
+}
+
 InitialState level(const Vector3d& force_base_mps2,
                    Nanoseconds stamp_ns,
                    const ImuConfig& imu,
@@ -289,19 +313,10 @@ InitialState level(const Vector3d& force_base_mps2,
   set(error::kRotation, kByDefinition);
   set(error::kVelocity, sigmas.velocity_mps);
   set(error::kGyroBias, sigmas.gyro_bias_radps);
-  set(error::kAccelBias, imu.initial_accel_bias_sigma_mps2);
-  // dg = R db, and dg = D e with D = -[g]x B, D^T D = |g|^2 I, so e = D^T R db / |g|^2.
-  const Eigen::Matrix<double, 3, 2> D =
-      -hat(state.gravity_odom_mps2) * gravity_tangent(state.gravity_odom_mps2);
-  const Eigen::Matrix<double, 2, 3> by_bias = D.transpose() *
-                                              state.T_odom_base.q.toRotationMatrix() /
-                                              (kStandardGravity_mps2 * kStandardGravity_mps2);
   const double bias2 = imu.initial_accel_bias_sigma_mps2 * imu.initial_accel_bias_sigma_mps2;
-  P.block<2, 2>(error::kGravity, error::kGravity) =
-      bias2 * by_bias * by_bias.transpose() +
+  add_bias_with_tilt(bias2 * Matrix3d::Identity(), initial);
+  P.block<2, 2>(error::kGravity, error::kGravity) +=
       sigmas.tilt_rad * sigmas.tilt_rad * Eigen::Matrix2d::Identity();
-  P.block<2, 3>(error::kGravity, error::kAccelBias) = bias2 * by_bias;
-  P.block<3, 2>(error::kAccelBias, error::kGravity) = bias2 * by_bias.transpose();
   return initial;
 }
 
@@ -385,9 +400,12 @@ StartResult start(const Config& configured,
     result.initial.state.gyro_bias_radps = summary.mean_gyro_radps;
     result.initial.state.accel_bias_mps2 =
         (force.norm() - kStandardGravity_mps2) * force.normalized();
-    return result;
+  } else {
+    result.initial = with_velocity(result.initial, v_base, v_sigma_mps);
   }
-  result.initial = with_velocity(result.initial, v_base, v_sigma_mps);
+  const ExtrinsicConfig& mounting = configured.extrinsic;
+  add_unknown_mounting(mounting.estimate ? mounting.rotation_sigma_rad : mounting.level_sigma_rad,
+                       result.initial);
   return result;
 }
 

@@ -54,6 +54,11 @@ InitialState level(const Eigen::Vector3d& force_base_mps2,
                    const ImuConfig& imu,
                    const StartSigmas& sigmas);
 
+/// A LiDAR that is mounted with another roll and pitch than configured, by `sigma_rad` each, makes
+/// a map that leans against the accelerometer by as much. It seems the accelerometer's bias, and
+/// the start cannot tell them apart.
+void add_unknown_mounting(double sigma_rad, InitialState& initial);
+
 struct StartResult {
   InitialState initial;
   bool at_rest{false};

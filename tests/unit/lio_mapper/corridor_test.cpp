@@ -140,6 +140,23 @@ TEST(BentMap, takes_nothing_from_what_holds) {
   EXPECT_LT((sum.information.ldlt().solve(sum.gradient) - before).norm(), 1e-5);
 }
 
+/// Nobody knows by how much a map bends: what is left where it is doubted must not be divided by a
+/// small remainder.
+TEST(BentMap, makes_no_long_step_of_what_it_barely_leaves) {
+  constexpr double kLength_m = 50.0;
+  for (const double lean_rad : {0.0141, 0.0143, 0.0147, 0.016}) {
+    const Eigen::Vector3d length(std::cos(lean_rad), 0.0, std::sin(lean_rad));
+    ErrorMatrix P = 1e-4 * ErrorMatrix::Identity();
+    P.topLeftCorner<3, 3>() += kLength_m * kLength_m * length * length.transpose();
+    PoseInformation sum = tunnel(0.0, 0.0);
+    doubt_bent_map(P, sum);
+    const Matrix6d posterior = P.topLeftCorner<6, 6>().inverse() + sum.information;
+    const Vector6d step = -posterior.ldlt().solve(sum.gradient);
+    EXPECT_LT(std::abs(step[0]), 0.05) << lean_rad;
+    EXPECT_LT(std::abs(step[2]), 0.02) << lean_rad;
+  }
+}
+
 TEST(Corridor, its_length_is_as_uncertain_as_it_is_wrong) {
   double squares = 0.0;
   constexpr int kSeeds = 8;

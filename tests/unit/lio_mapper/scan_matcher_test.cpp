@@ -377,5 +377,73 @@ TEST(ScanMatcher, what_two_places_say_of_an_open_axis_is_not_believed) {
   EXPECT_NEAR(information_along(0.5), 0.0, 1e-6);
 }
 
+/// A tunnel at whose ends planes lie as chance laid them, wherever a point is, all along the same
+/// way across: some of what they make up, they make up of the tunnel's walls.
+class TunnelWithRings final : public UnchangingMap {
+ public:
+  bool match_surface(const Eigen::Vector3d& p, PlaneMatch& plane) const override {
+    return tunnel_.match_surface(p, plane);
+  }
+
+  bool match_nearest(const Eigen::Vector3d& p, PlaneMatch& plane) const override {
+    const VoxelIndex voxel = voxel_index(p.x(), p.y(), p.z(), 5.0);
+    std::mt19937 chance(
+        static_cast<unsigned>(voxel.x * 73856093 ^ voxel.y * 19349663 ^ voxel.z * 83492791));
+    std::uniform_real_distribution<double> beside_m(-0.1, 0.1);
+    const Eigen::Vector3d normal = Eigen::Vector3d(0.8, 0.6, 0.0);
+    const Eigen::Vector3d centre = (Eigen::Vector3d(voxel.x, voxel.y, voxel.z).array() + 0.5) / 5.0;
+    plane = {normal, -normal.dot(centre) + beside_m(chance), 0.1 * 0.1, 0.0};
+    return true;
+  }
+
+ private:
+  Room tunnel_{false};
+};
+
+TEST(ScanMatcher, walls_do_not_vouch_for_what_planes_of_chance_say_along_them) {
+  const TunnelWithRings tunnel;
+  const PointCloud points = room_points();
+  const MatchingConfig config;
+  Workers workers{2};
+  ScanMatcher matcher(points, tunnel, Pose{}, config, workers);
+  const Matrix6d information = matcher.linearise(Pose{}).information;
+  EXPECT_GT(information(1, 1), 1e3);
+  EXPECT_LT(information(0, 0), 1e-4 * information(1, 1));
+}
+
+/// Ends of a tunnel that most points find; in a corner planes go with them instead.
+class TunnelWithLeaves final : public UnchangingMap {
+ public:
+  bool match_surface(const Eigen::Vector3d& p, PlaneMatch& plane) const override {
+    return tunnel_.match_surface(p, plane);
+  }
+
+  bool match_nearest(const Eigen::Vector3d& p, PlaneMatch& plane) const override {
+    const VoxelIndex voxel = voxel_index(p.x(), p.y(), p.z(), 5.0);
+    const double end_m = p.x() < 0.0 ? -4.0 : 4.0;
+    const double centre_m = (voxel.x + 0.5) / 5.0;
+    const bool is_leaf = p.y() > 0.0 && (p.z() > 0.0 || p.x() > 0.0);
+    plane = {Eigen::Vector3d::UnitX(), is_leaf ? -centre_m : -end_m, 0.1 * 0.1, 0.0};
+    return true;
+  }
+
+ private:
+  Room tunnel_{false};
+};
+
+/// The part of the pull that is not certain makes the step less certain, not longer.
+TEST(ScanMatcher, a_step_is_as_long_as_the_scan_is_pulled_back) {
+  constexpr double kAway_m = 0.1;
+  const TunnelWithLeaves tunnel;
+  const PointCloud points = room_points();
+  const MatchingConfig config;
+  Workers workers{2};
+  ScanMatcher matcher(points, tunnel, Pose{}, config, workers);
+  const PoseInformation sum =
+      matcher.linearise({Eigen::Quaterniond::Identity(), {kAway_m, 0.0, 0.0}});
+  const Vector6d step = -sum.information.ldlt().solve(sum.gradient);
+  EXPECT_NEAR(step[0], -kAway_m, 0.25 * kAway_m);
+}
+
 }  // namespace
 }  // namespace trigpoint::lio_mapper

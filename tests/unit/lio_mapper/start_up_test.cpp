@@ -89,9 +89,8 @@ TEST(StartUp, says_when_the_imu_is_upside_down_or_gravity_was_taken_out) {
 }
 
 /// What the mapper has when it starts: a second of IMU and of sweeps.
-StartResult start_of(const testing_support::RoomDrive& drive) {
+StartResult start_of(const testing_support::RoomDrive& drive, const Config& config = {}) {
   constexpr Nanoseconds kSweep_ns = 100'000'000;
-  Config config;
   SweepDecoder decoder(config.sweep);
   ImuBuffer imu;
   std::deque<Sweep> sweeps;
@@ -105,6 +104,29 @@ StartResult start_of(const testing_support::RoomDrive& drive) {
     imu.push({sample.stamp_ns, sample.gyro_radps, sample.accel_mps2});
   }
   return start(config, Pose{}, imu, sweeps);
+}
+
+/// A LiDAR that leans against the accelerometer makes a map that leans, and the accelerometer seems
+/// biased by as much of gravity.
+TEST(StartUp, leaves_open_that_the_lidar_leans_against_the_accelerometer) {
+  const auto sigmas = [](const Config& config) {
+    const ErrorMatrix P = start_of(testing_support::RoomDrive(10.0), config).initial.covariance;
+    return Eigen::Vector3d(std::sqrt(P(error::kGravity, error::kGravity)),
+                           std::sqrt(P(error::kAccelBias, error::kAccelBias)),
+                           std::sqrt(P(error::kAccelBias + 2, error::kAccelBias + 2)));
+  };
+  Config config;
+  config.extrinsic.level_sigma_rad = 0.0;
+  config.extrinsic.rotation_sigma_rad = 0.03;
+  const Eigen::Vector3d exact = sigmas(config);
+  config.extrinsic.level_sigma_rad = 0.01;
+  const Eigen::Vector3d held = sigmas(config);
+  config.extrinsic.estimate = true;
+  const Eigen::Vector3d estimated = sigmas(config);
+  EXPECT_NEAR(held[0], std::hypot(exact[0], 0.01), 1e-5);
+  EXPECT_NEAR(held[1], std::hypot(exact[1], 0.01 * kStandardGravity_mps2), 1e-3);
+  EXPECT_NEAR(estimated[0], std::hypot(exact[0], 0.03), 1e-5);
+  EXPECT_NEAR(estimated[2], exact[2], 1e-5) << "gravity's size does not depend on it";
 }
 
 /// Two sweeps of a coarse LiDAR seem to move by decimetres a second.

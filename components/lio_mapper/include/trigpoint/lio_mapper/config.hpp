@@ -85,6 +85,7 @@ struct MatchingConfig {
 struct ExtrinsicConfig {
   bool estimate{false};
   double rotation_sigma_rad{0.03};
+  double level_sigma_rad{0.01};  ///< of roll and pitch when they are not estimated
   double position_sigma_m{0.05};
 };
 
