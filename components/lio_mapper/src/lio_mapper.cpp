@@ -299,7 +299,7 @@ void LioMapper::Impl::report(const ScanOutcome& outcome, Output& output) {
   result.status = status;
   result.status.scan_ms = sweeps.front().decoding_ms;
   result.points_odom = transformed(outcome.thinned_base, state.T_odom_base);
-  if (outcome.used && !stored_points &&
+  if (outcome.used && filter->is_placed() && !stored_points &&
       keyframe_trigger.fires(filter->stamp_ns(), state.T_odom_base)) {
     result.keyframe = make_keyframe(outcome, result.odometry);
   }

@@ -40,6 +40,11 @@ constexpr int kMostReshapes = 2;
 constexpr double kLeastCorrection_rad = 1e-6;
 /// A scan is put into the map unmatched only while its pose relative to the map is this certain.
 constexpr double kMapSigma_m = 0.3;
+/// After a search scans are kept out of the map until the position is this certain, for so long at
+/// most: along a corridor the search finds places that are as good, and a scan that is put in at
+/// one of them vouches for it.
+constexpr double kPlacedSigma_m = 0.1;
+constexpr double kMostKeptOut_s = 1.0;
 
 InitialState with_extrinsic(InitialState initial,
                             const Pose& T_base_lidar,
@@ -278,11 +283,13 @@ void ScanFilter::take_over(Past past) {
   drift_covariance_ = past.drift_covariance;
   map_ = std::move(past.map);
   pruned_at_m_ = state().T_odom_base.p;
+  searched_ns_ = stamp_ns();
 }
 
 bool ScanFilter::search(const PoseSearch& look,
                         const PointCloud& thinned_base,
-                        Prediction& prediction) const {
+                        Nanoseconds scan_ns,
+                        Prediction& prediction) {
   const Sighting sighting = look(prediction.state, prediction.covariance, thinned_base);
   if (sighting.match_as_usual || !sighting.T_odom_base) {
     return sighting.match_as_usual;
@@ -312,6 +319,7 @@ bool ScanFilter::search(const PoseSearch& look,
   prediction.state = result.state;
   prediction.covariance = result.covariance;
   prediction.transition = (result.transition * prediction.transition).eval();
+  searched_ns_ = scan_ns;
   return result.used;
 }
 
@@ -377,7 +385,8 @@ ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu, const 
   outcome.first = map_->empty();
 
   begin(Stage::kSolve);
-  const bool match_it = !outcome.first && (!look || search(look, outcome.thinned_base, prediction));
+  const bool match_it =
+      !outcome.first && (!look || search(look, outcome.thinned_base, sweep.end_ns, prediction));
   ScanRecord record;
   record.stamp_ns = sweep.end_ns;
   record.before_rows = prediction.state;
@@ -407,7 +416,11 @@ PointCloud ScanFilter::insert(const ScanOutcome& outcome) {
   const Vector3d& p = state().T_odom_base.p;
   const double sigma2 = covariance().diagonal().head<3>().maxCoeff();
   PointCloud points_odom;
-  if (outcome.used || sigma2 < kMapSigma_m * kMapSigma_m) {
+  if (searched_ns_ && (sigma2 < kPlacedSigma_m * kPlacedSigma_m ||
+                       to_seconds(stamp_ns() - *searched_ns_) >= kMostKeptOut_s)) {
+    searched_ns_.reset();
+  }
+  if (is_placed() && (outcome.used || sigma2 < kMapSigma_m * kMapSigma_m)) {
     points_odom = transformed(outcome.thinned_base, state().T_odom_base);
     map_->insert(points_odom);
   }

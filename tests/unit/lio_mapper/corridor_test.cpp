@@ -12,9 +12,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <random>
 #include <string>
 #include <variant>
+#include <vector>
 
 namespace trigpoint::lio_mapper {
 
@@ -54,47 +56,89 @@ class CorridorDrive final : public RoomDrive {
   }
 };
 
+/// A filter in a drive, without GPS.
+class Driver {
+ public:
+  Driver(RoomDrive& drive, unsigned seed, int seconds) : drive_(drive) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal(0.0, 1.0);
+    drive.noise_seed = 1000 * seed;
+    drive.range_sigma_m = 0.02;
+    for (int i = 0; i < 3; ++i) {
+      drive.gyro_bias_radps[i] = 1e-3 * normal(random);
+      drive.accel_bias_mps2[i] = 0.03 * normal(random);
+    }
+    Eigen::Vector3d accel_sum = Eigen::Vector3d::Zero();
+    constexpr int kAtRest = 400;
+    for (int i = 0; i <= seconds * 200 + 40; ++i) {
+      ImuSample sample = drive.imu_at(RoomDrive::kEpoch_ns + i * kImuStep_ns);
+      for (int axis = 0; axis < 3; ++axis) {
+        sample.gyro_radps[axis] += 4e-3 * normal(random);
+        sample.accel_mps2[axis] += 0.06 * normal(random);
+      }
+      accel_sum += i < kAtRest ? sample.accel_mps2 : Eigen::Vector3d::Zero();
+      imu_.push({sample.stamp_ns, sample.gyro_radps, sample.accel_mps2});
+    }
+    const Config config;
+    InitialState initial = level(accel_sum / kAtRest, RoomDrive::kEpoch_ns, config.imu, {});
+    initial.state.gyro_bias_radps = drive.gyro_bias_radps;
+    filter.emplace(config, Pose{}, initial);
+  }
+
+  /// Turn `i` of the LiDAR; gives what has entered the map.
+  PointCloud turn(int i, const PoseSearch& look = {}) {
+    Events events;
+    const auto decoded =
+        decoder_.decode(drive_.sweep_at(RoomDrive::kEpoch_ns + i * kTurn_ns), events);
+    return filter->insert(filter->process(std::get<Sweep>(decoded), imu_, look));
+  }
+
+  std::optional<ScanFilter> filter;
+
+ private:
+  const RoomDrive& drive_;
+  ImuBuffer imu_;
+  SweepDecoder decoder_{SweepTimingConfig{}};
+};
+
 struct Along {
   double error_m;
   double sigma_m;
 };
 
-/// Of the position along the corridor after `seconds`, without GPS.
+/// Of the position along the corridor after `seconds`.
 Along driven(unsigned seed, int seconds) {
-  std::mt19937 random(seed);
-  std::normal_distribution<double> normal(0.0, 1.0);
   CorridorDrive drive;
-  drive.noise_seed = 1000 * seed;
-  drive.range_sigma_m = 0.02;
-  for (int i = 0; i < 3; ++i) {
-    drive.gyro_bias_radps[i] = 1e-3 * normal(random);
-    drive.accel_bias_mps2[i] = 0.03 * normal(random);
-  }
-  Config config;
-  ImuBuffer imu;
-  Eigen::Vector3d accel_sum = Eigen::Vector3d::Zero();
-  constexpr int kAtRest = 400;
-  for (int i = 0; i <= seconds * 200 + 40; ++i) {
-    ImuSample sample = drive.imu_at(RoomDrive::kEpoch_ns + i * kImuStep_ns);
-    for (int axis = 0; axis < 3; ++axis) {
-      sample.gyro_radps[axis] += 4e-3 * normal(random);
-      sample.accel_mps2[axis] += 0.06 * normal(random);
-    }
-    accel_sum += i < kAtRest ? sample.accel_mps2 : Eigen::Vector3d::Zero();
-    imu.push({sample.stamp_ns, sample.gyro_radps, sample.accel_mps2});
-  }
-  InitialState initial = level(accel_sum / kAtRest, RoomDrive::kEpoch_ns, config.imu, {});
-  initial.state.gyro_bias_radps = drive.gyro_bias_radps;
-  ScanFilter filter(config, Pose{}, initial);
-  SweepDecoder decoder{SweepTimingConfig{}};
+  Driver driver(drive, seed, seconds);
   for (int i = 0; i < seconds * 10; ++i) {
-    Events events;
-    const auto decoded =
-        decoder.decode(drive.sweep_at(RoomDrive::kEpoch_ns + i * kTurn_ns), events);
-    filter.insert(filter.process(std::get<Sweep>(decoded), imu));
+    driver.turn(i);
   }
   const double truth_m = drive.pose_at(seconds).p.x();
-  return {filter.state().T_odom_base.p.x() - truth_m, std::sqrt(filter.covariance()(0, 0))};
+  return {driver.filter->state().T_odom_base.p.x() - truth_m,
+          std::sqrt(driver.filter->covariance()(0, 0))};
+}
+
+/// Points that enter the map with each turn, after six seconds without scans and a search that
+/// puts the robot 0.3 m too far along x, where it says that places are as good.
+std::vector<std::size_t> entered_after_search(RoomDrive& drive) {
+  constexpr int kBlindFrom = 40;
+  constexpr int kBlindTo = 100;
+  constexpr int kAfter = 15;
+  Driver driver(drive, 1, (kBlindTo + kAfter) / 10);
+  for (int i = 0; i < kBlindFrom; ++i) {
+    driver.turn(i);
+  }
+  const Pose T_odom_start = drive.pose_at(0.0).inverse();
+  const auto look = [&](const State&, const ErrorMatrix&, const PointCloud&) {
+    Pose found = T_odom_start * drive.pose_at(0.1 * (kBlindTo + 1));
+    found.p.x() += 0.3;
+    return Sighting{false, found, Eigen::Vector2d(0.1, 0.0).asDiagonal()};
+  };
+  std::vector<std::size_t> entered;
+  for (int i = 0; i < kAfter; ++i) {
+    entered.push_back(driver.turn(kBlindTo + i, i == 0 ? PoseSearch(look) : PoseSearch()).size());
+  }
+  return entered;
 }
 
 /// A floor, walls and ceiling that hold across 1 cm each, turned by `bend_rad` about y.
@@ -169,6 +213,17 @@ TEST(Corridor, its_length_is_as_uncertain_as_it_is_wrong) {
   }
   // Chi-square of 8 degrees of freedom: 0.999 quantile.
   EXPECT_LT(squares, 26.1);
+}
+
+/// What is put into the map at one of several places as good vouches for it from then on.
+TEST(Corridor, a_scan_that_a_search_found_at_one_of_many_places_stays_out_of_the_map) {
+  CorridorDrive corridor;
+  const auto entered = entered_after_search(corridor);
+  EXPECT_EQ(std::count(entered.begin(), entered.begin() + 10, 0U), 10);
+  EXPECT_GT(*std::min_element(entered.begin() + 10, entered.end()), 500U)
+      << "a map that does not go on is soon left";
+  RoomDrive hall;
+  EXPECT_GT(entered_after_search(hall).front(), 500U) << "ends settle the place at once";
 }
 
 }  // namespace
