@@ -9,9 +9,11 @@
 #include "scan_matcher.hpp"
 #include "scan_parts.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <stdexcept>
+#include <vector>
 
 namespace trigpoint::lio_mapper {
 
@@ -31,6 +33,53 @@ constexpr std::int64_t kMaxIterations = 20;
 constexpr double kTopPosition_m = 0.15;
 constexpr double kTopYaw_rad = 0.02;
 constexpr double kLevel_rad = 0.01;  // of the scan's
+
+/// Around the pose that the matcher leads to, scans are laid on the map's surfaces so far and in
+/// such steps: a street's facades hold a scan anywhere along it, and what little stands across it
+/// pulls only when it is nearly met.
+constexpr double kSharpenReach_m = 0.4;
+constexpr double kSharpenStep_m = 0.1;
+constexpr double kOnSurface_m = 0.07;  // one sigma
+/// Another place is better when so much more of the scan lies on surfaces.
+constexpr double kSharper = 0.03;
+
+/// Mean likelihood of the points by their distance to the map's surfaces.
+double share_on_surfaces(const PointCloud& points_base,
+                         const Pose& T_odom_base,
+                         const LocalMap& map) {
+  double sum = 0.0;
+  for (const PointXyzi& point : points_base) {
+    const Vector3d p = T_odom_base * point.position().cast<double>();
+    PlaneMatch plane;
+    if (map.match_surface(p, plane)) {
+      const double sigmas = (plane.normal.dot(p) + plane.offset_m) / kOnSurface_m;
+      sum += std::exp(-0.5 * sigmas * sigmas);
+    }
+  }
+  return sum / static_cast<double>(points_base.size());
+}
+
+/// The place in the plane around `T_odom_base` at which the scan lies best on surfaces.
+Pose sharpened(const Pose& T_odom_base,
+               const PointCloud& points_base,
+               const LocalMap& map,
+               Workers& workers) {
+  const int steps = static_cast<int>(std::lround(kSharpenReach_m / kSharpenStep_m));
+  const int side = 2 * steps + 1;
+  std::vector<double> shares(static_cast<std::size_t>(side * side));
+  const auto place = [&](std::size_t i) {
+    const int at = static_cast<int>(i);
+    Pose T = T_odom_base;
+    T.p.head<2>() += kSharpenStep_m * Vector2d(at % side - steps, at / side - steps);
+    return T;
+  };
+  workers.run(shares.size(),
+              [&](std::size_t i) { shares[i] = share_on_surfaces(points_base, place(i), map); });
+  const auto best = std::max_element(shares.begin(), shares.end());
+  const double here = shares[shares.size() / 2];
+  return *best > here + kSharper ? place(static_cast<std::size_t>(best - shares.begin()))
+                                 : T_odom_base;
+}
 
 std::optional<Pose> refined(const Hypothesis& h,
                             const LevelScan& scan,
@@ -154,8 +203,16 @@ RegistrationResult register_scan(const LevelScan& scan,
   if (area.holds_robot) {
     weigh_with_centre(area, top, spread_m2);
   }
-  const auto T =
-      refined(top, scan, thinned(scan.points_base, kRefinedPoints), map, matching, workers);
+  const PointCloud points = thinned(scan.points_base, kRefinedPoints);
+  auto T = refined(top, scan, points, map, matching, workers);
+  if (T) {
+    const Pose sharp = sharpened(*T, points, map, workers);
+    if (sharp.p != T->p) {
+      top.p_odom_m.head<2>() = sharp.p.head<2>();
+      top.yaw_rad = yaw_of(sharp.q);
+      T = refined(top, scan, points, map, matching, workers);
+    }
+  }
   if (!T) {
     result.obstacle = "the scan matches nowhere";
     return result;

@@ -29,7 +29,9 @@ constexpr double kLongestStep_s = 0.02;
 /// Less motion between two scans is jitter of the estimate.
 constexpr double kLeastMotion_m = 0.005;
 /// Of a pose that a search found, before the scan is matched there.
-constexpr double kFoundPosition_m = 0.1;
+/// In the plane a cell of the field that is searched, where no surface tells more.
+constexpr double kFoundPlace_m = 0.25;
+constexpr double kFoundHeight_m = 0.1;
 constexpr double kFoundRotation_rad = 0.01;
 /// A sweep of a guessed motion that was wrong by more at its end is undistorted anew: a smear of
 /// range noise, at 10 m.
@@ -40,11 +42,11 @@ constexpr int kMostReshapes = 2;
 constexpr double kLeastCorrection_rad = 1e-6;
 /// A scan is put into the map unmatched only while its pose relative to the map is this certain.
 constexpr double kMapSigma_m = 0.3;
-/// After a search scans are kept out of the map until the position is this certain, for so long at
-/// most: along a corridor the search finds places that are as good, and a scan that is put in at
-/// one of them vouches for it.
+/// After a search scans are kept out of the map until the position is this certain, so far on the
+/// way at most: where a direction is open the search finds places that are as good, and a scan that
+/// is put in at one of them vouches for it. Farther on the old map shows too little.
 constexpr double kPlacedSigma_m = 0.1;
-constexpr double kMostKeptOut_s = 1.0;
+constexpr double kMostKeptOut_m = 20.0;
 
 InitialState with_extrinsic(InitialState initial,
                             const Pose& T_base_lidar,
@@ -207,7 +209,8 @@ UpdateResult ScanFilter::update(const Prediction& prediction, ScanMatcher& match
   const auto timed = [&](const auto& linearise) {
     begin(Stage::kMatch);
     auto information = linearise();
-    doubt_bent_map(prediction.covariance, information);
+    unbent_ = unbent_share(prediction.covariance, information);
+    keep_unbent(unbent_, information);
     begin(Stage::kSolve);
     return information;
   };
@@ -232,7 +235,7 @@ UpdateResult ScanFilter::match(const Prediction& prediction,
     blind_ = blindness(result.measured.information.topLeftCorner<3, 3>());
     PoseInformation known;
     known.information = matcher.information_by_patches();
-    doubt_bent_map(prediction.covariance, known);
+    keep_unbent(unbent_, known);
     known_by_patches_ = beyond(result.measured.information, known.information);
   }
   outcome.matches = result.count;
@@ -283,19 +286,19 @@ void ScanFilter::take_over(Past past) {
   drift_covariance_ = past.drift_covariance;
   map_ = std::move(past.map);
   pruned_at_m_ = state().T_odom_base.p;
-  searched_ns_ = stamp_ns();
+  searched_at_m_ = distance_m_;
 }
 
 bool ScanFilter::search(const PoseSearch& look,
                         const PointCloud& thinned_base,
-                        Nanoseconds scan_ns,
                         Prediction& prediction) {
   const Sighting sighting = look(prediction.state, prediction.covariance, thinned_base);
   if (sighting.match_as_usual || !sighting.T_odom_base) {
     return sighting.match_as_usual;
   }
   const Pose& found = *sighting.T_odom_base;
-  Matrix3d covariance_m2 = kFoundPosition_m * kFoundPosition_m * Matrix3d::Identity();
+  Matrix3d covariance_m2 =
+      Vector3d(kFoundPlace_m, kFoundPlace_m, kFoundHeight_m).cwiseAbs2().asDiagonal();
   covariance_m2.topLeftCorner<2, 2>() += sighting.spread_m2;
   const Matrix3d position = covariance_m2.inverse();
   // An ordinary measurement of the whole pose: the cross-covariances that grew while the IMU was
@@ -319,7 +322,9 @@ bool ScanFilter::search(const PoseSearch& look,
   prediction.state = result.state;
   prediction.covariance = result.covariance;
   prediction.transition = (result.transition * prediction.transition).eval();
-  searched_ns_ = scan_ns;
+  if (result.used) {
+    searched_at_m_ = distance_m_;
+  }
   return result.used;
 }
 
@@ -385,8 +390,7 @@ ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu, const 
   outcome.first = map_->empty();
 
   begin(Stage::kSolve);
-  const bool match_it =
-      !outcome.first && (!look || search(look, outcome.thinned_base, sweep.end_ns, prediction));
+  const bool match_it = !outcome.first && (!look || search(look, outcome.thinned_base, prediction));
   ScanRecord record;
   record.stamp_ns = sweep.end_ns;
   record.before_rows = prediction.state;
@@ -414,12 +418,15 @@ ScanOutcome ScanFilter::process(const Sweep& sweep, const ImuBuffer& imu, const 
 PointCloud ScanFilter::insert(const ScanOutcome& outcome) {
   begin(Stage::kInsert);
   const Vector3d& p = state().T_odom_base.p;
-  const double sigma2 = covariance().diagonal().head<3>().maxCoeff();
-  PointCloud points_odom;
-  if (searched_ns_ && (sigma2 < kPlacedSigma_m * kPlacedSigma_m ||
-                       to_seconds(stamp_ns() - *searched_ns_) >= kMostKeptOut_s)) {
-    searched_ns_.reset();
+  const double sigma2 = Eigen::SelfAdjointEigenSolver<Matrix3d>(covariance().topLeftCorner<3, 3>(),
+                                                                Eigen::EigenvaluesOnly)
+                            .eigenvalues()
+                            .maxCoeff();
+  if (sigma2 < kPlacedSigma_m * kPlacedSigma_m ||
+      (searched_at_m_ && distance_m_ - *searched_at_m_ >= kMostKeptOut_m)) {
+    searched_at_m_.reset();
   }
+  PointCloud points_odom;
   if (is_placed() && (outcome.used || sigma2 < kMapSigma_m * kMapSigma_m)) {
     points_odom = transformed(outcome.thinned_base, state().T_odom_base);
     map_->insert(points_odom);

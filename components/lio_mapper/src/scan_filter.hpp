@@ -126,8 +126,9 @@ class ScanFilter {
   /// Called once between process() and the next process(): rows that wait count before the scan
   /// enters the map. Gives what has entered it, in odom.
   PointCloud insert(const ScanOutcome& outcome);
+
   /// False from a search for the place on, until scans have settled it: they are kept out of maps.
-  bool is_placed() const { return !searched_ns_; }
+  bool is_placed() const { return !searched_at_m_ || map_->empty(); }
 
  private:
   struct Prediction {
@@ -143,10 +144,7 @@ class ScanFilter {
   static void add_clock_noise(const Sweep& sweep, Prediction& prediction);
   void begin(Stage stage) const;
   /// The prediction conditioned on the pose that a search found; false when it found none.
-  bool search(const PoseSearch& look,
-              const PointCloud& thinned_base,
-              Nanoseconds scan_ns,
-              Prediction& prediction);
+  bool search(const PoseSearch& look, const PointCloud& thinned_base, Prediction& prediction);
   void shape(const Sweep& sweep, const Prediction& prediction, ScanOutcome& outcome) const;
   UpdateResult match_guessed(const Sweep& sweep, Prediction& prediction, ScanOutcome& outcome);
   UpdateResult match(const Prediction& prediction,
@@ -171,7 +169,10 @@ class ScanFilter {
   bool aligned_{false};
   double distance_m_{0.0};
   Eigen::Vector3d pruned_at_m_{Eigen::Vector3d::Zero()};
-  std::optional<Nanoseconds> searched_ns_;  ///< while the place that was found is not settled
+  /// distance_m_ when the place was searched for, while what was found is not settled.
+  std::optional<double> searched_at_m_;
+  /// At the newest linearisation, see bent_map.hpp.
+  Eigen::Matrix3d unbent_{Eigen::Matrix3d::Identity()};
   /// What the newest scan knows of the pose by its patches, see scan_matcher.hpp.
   Matrix6d known_by_patches_{Matrix6d::Zero()};
   /// Of the last usable scan, see drift.hpp.

@@ -17,6 +17,9 @@ using Eigen::Vector3d;
 
 namespace {
 
+/// Of the promised pull; where less comes, no step does.
+constexpr double kLeastPull = 1e-3;
+
 /// A point that moved less sees the same plane.
 constexpr double kRematch_m = 0.05;
 /// What matches were found to be worth holds this near: points at ten metres keep their planes.
@@ -224,24 +227,50 @@ PoseInformation ScanMatcher::sum_of_all(const Viewpoint& view) {
 /// the estimate back at the prediction and makes it look certain [W. A. Fuller, Measurement Error
 /// Models, 1987, ch. 1]. Along each principal axis of the position's information A, with N of it
 /// noise and f = 1 - N / A: the solution g / (A - N) has the variance A / (A - N)^2, which is that
-/// of the information f^2 A with the gradient f g. Where axes were judged, it is those, and along
-/// none is more left than was found there.
-Matrix6d ScanMatcher::noise_free_share(const PoseInformation& sum) const {
+/// of the information f^2 A with the gradient f g. Where axes were judged, it is those, and the
+/// smaller share is meant.
+ScanMatcher::Worth ScanMatcher::worth_along_axes(const PoseInformation& sum) const {
   const Eigen::Matrix3d position = sum.information.topLeftCorner<3, 3>();
-  const Eigen::Matrix3d axes =
-      open_.axes_odom ? *open_.axes_odom
-                      : Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(position).eigenvectors();
-  Eigen::Matrix3d keep = Eigen::Matrix3d::Zero();
+  Worth worth;
+  worth.axes_odom = open_.axes_odom
+                        ? *open_.axes_odom
+                        : Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(position).eigenvectors();
   for (int i = 0; i < 3; ++i) {
-    const Vector3d axis = axes.col(i);
+    const Vector3d axis = worth.axes_odom.col(i);
     const double noise = axis.dot(sum.noise * axis);
-    const double share = std::min(std::max(0.0, 1.0 - noise / (axis.dot(position * axis) + 1e-12)),
-                                  open_.pulled_back[i]);
-    keep += share * axis * axis.transpose();
+    worth.noise_free[i] = std::max(0.0, 1.0 - noise / (axis.dot(position * axis) + 1e-12));
+    worth.likely[i] = std::min(worth.noise_free[i], open_.likely[i]);
+    if (worth.noise_free[i] > 0.0) {
+      const double certain = std::min(worth.noise_free[i], open_.pulled_back[i]);
+      worth.certain[i] = open_.root_trust[i] * certain / worth.noise_free[i];
+    }
   }
-  Matrix6d by = Matrix6d::Identity();
-  by.topLeftCorner<3, 3>() = keep;
-  return by;
+  return worth;
+}
+
+/// Of the noise-free information, along each axis the share `certain`^2. The rest is taken out as
+/// if that axis were a nuisance of so much more variance: with it goes what it says of the heading
+/// and of the other axes. (Only its own rows and columns made smaller, the rest would pass for
+/// certain, and a place that is wrong along a street would turn the robot.)
+Matrix6d left_of(const Matrix6d& noise_free,
+                 const Eigen::Matrix3d& axes_odom,
+                 const Vector3d& certain) {
+  Matrix6d left = noise_free;
+  for (int i = 0; i < 3; ++i) {
+    const Vector6d told = left.leftCols<3>() * axes_odom.col(i);
+    const double along = axes_odom.col(i).dot(told.head<3>());
+    if (along > kUnseen * kUnseen) {
+      left -= (1.0 - certain[i] * certain[i]) / along * told * told.transpose();
+    }
+  }
+  return left;
+}
+
+/// A matrix over the position's axes, the identity over the rotation.
+Matrix6d over_axes(const Eigen::Matrix3d& axes_odom, const Vector3d& along) {
+  Matrix6d all = Matrix6d::Identity();
+  all.topLeftCorner<3, 3>() = axes_odom * along.asDiagonal() * axes_odom.transpose();
+  return all;
 }
 
 /// What the sum over all residuals is worth.
@@ -250,16 +279,7 @@ PoseInformation ScanMatcher::weighed(PoseInformation sum, double least_scatter) 
     scratch_.kept.setZero();
     return sum;
   }
-  const Matrix6d by = noise_free_share(sum);
-  const auto along_axes = [this](const Vector3d& parts) {
-    Matrix6d all = Matrix6d::Identity();
-    if (open_.axes_odom) {
-      all.topLeftCorner<3, 3>() =
-          *open_.axes_odom * parts.asDiagonal() * open_.axes_odom->transpose();
-    }
-    return all;
-  };
-  const Matrix6d root_trust = along_axes(open_.root_trust);
+  const Worth worth = worth_along_axes(sum);
   const Eigen::LLT<Matrix6d> root(sum.information + kUnseen * Matrix6d::Identity());
   scratch_.unweighed = sum.information;
   scratch_.step = -root.solve(sum.gradient);
@@ -268,10 +288,14 @@ PoseInformation ScanMatcher::weighed(PoseInformation sum, double least_scatter) 
   const double scale =
       static_cast<double>(std::min(count_patches(), most)) / static_cast<double>(sum.count);
   scratch_.least_scatter = least_scatter;
-  scratch_.kept = root_trust * by;
-  sum.information = (scale * scratch_.kept * sum.information * scratch_.kept.transpose()).eval();
-  sum.gradient =
-      (scale * root_trust * scratch_.kept * along_axes(open_.certain) * sum.gradient).eval();
+  scratch_.kept = over_axes(worth.axes_odom, worth.noise_free);
+  sum.information = scale * left_of(scratch_.kept * sum.information * scratch_.kept.transpose(),
+                                    worth.axes_odom,
+                                    worth.certain);
+  // The step is as long as the pull that comes says, not as what is promised.
+  const Vector3d longer = (worth.likely.array() > kLeastPull)
+                              .select(worth.likely.cwiseMax(kLeastPull).cwiseInverse(), 0.0);
+  sum.gradient = -sum.information * over_axes(worth.axes_odom, longer) * scratch_.step;
   sum.noise *= scale;
   return sum;
 }

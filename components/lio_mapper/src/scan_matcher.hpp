@@ -109,8 +109,16 @@ class ScanMatcher {
   struct OpenAxes {
     std::optional<Eigen::Matrix3d> axes_odom;              ///< columns; none before it was judged
     Eigen::Vector3d pulled_back{Eigen::Vector3d::Ones()};  ///< certain share of the promised pull
-    Eigen::Vector3d certain{Eigen::Vector3d::Ones()};      ///< part of the share that is certain
+    Eigen::Vector3d likely{Eigen::Vector3d::Ones()};       ///< the share itself, 0 to 1
     Eigen::Vector3d root_trust{Eigen::Vector3d::Ones()};   ///< root of the share believed
+  };
+
+  /// What a sum is worth along axes of the position.
+  struct Worth {
+    Eigen::Matrix3d axes_odom;                         ///< columns
+    Eigen::Vector3d noise_free;                        ///< share of the information, 0 to 1
+    Eigen::Vector3d certain{Eigen::Vector3d::Ones()};  ///< share of what is noise-free, 0 to 1
+    Eigen::Vector3d likely;                            ///< share of the promised pull that comes
   };
 
   using Ask = bool (LocalMap::*)(const Eigen::Vector3d&, PlaneMatch&) const;
@@ -135,7 +143,7 @@ class ScanMatcher {
   static Share share_of(const std::vector<Pull>& by_patch);
   double trust_in(const Eigen::Vector3d& axis_odom, std::size_t cells) const;
   Eigen::Matrix3d axes_of_surfaces(const Eigen::Matrix3d& information) const;
-  Matrix6d noise_free_share(const PoseInformation& sum) const;
+  Worth worth_along_axes(const PoseInformation& sum) const;
   void judge_open_axes(const Viewpoint& view, const Eigen::Matrix3d& information);
   std::size_t number_cubes(double side_m, std::uint32_t Residual::*number);
   std::size_t count_patches();

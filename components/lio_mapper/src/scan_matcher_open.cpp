@@ -161,7 +161,7 @@ void ScanMatcher::judge_open_axes(const Viewpoint& view, const Eigen::Matrix3d& 
     const Vector3d axis = open_.axes_odom->col(i);
     double along = 1.0;
     double trust = 1.0;
-    double certain = 1.0;
+    double likely = 1.0;
     const double promised_here = axis.dot(information * axis);
     if (promised_here > kUnseen && promised_here < 1.0 / (kOpenPosition_m * kOpenPosition_m)) {
       std::vector<Pull> by_patch(patches_.size());
@@ -169,7 +169,7 @@ void ScanMatcher::judge_open_axes(const Viewpoint& view, const Eigen::Matrix3d& 
       add_pulls(view, axis, -kDisplaced_m, by_patch);
       const Share pulled = share_of(by_patch);
       along = std::clamp(pulled.share - kCertainShare_sigmas * pulled.sigma, 0.0, 1.0);
-      certain = along > 0.0 ? std::min(1.0, along / pulled.share) : 1.0;
+      likely = std::clamp(pulled.share, 0.0, 1.0);
       trust = trust_in(axis, cells);
       // Vaguer than the displacement within which matches hold, and most of it not even certain.
       const double left = trust * along * along * promised_here;
@@ -177,7 +177,7 @@ void ScanMatcher::judge_open_axes(const Viewpoint& view, const Eigen::Matrix3d& 
       trust = is_vague && along < kMostlyPulled ? 0.0 : trust;
     }
     open_.pulled_back[i] = along;
-    open_.certain[i] = certain;
+    open_.likely[i] = likely;
     open_.root_trust[i] = std::sqrt(trust);
   }
 }

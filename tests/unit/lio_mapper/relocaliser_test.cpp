@@ -351,6 +351,32 @@ TEST(Relocaliser, goes_by_the_prediction_along_a_corridor_where_the_area_holds_t
   EXPECT_LT(rms_m, 0.05);
 }
 
+/// The field's cells are too coarse for what stands across the walls in two places only.
+TEST(Relocaliser, finds_its_place_along_a_street_by_what_little_stands_across_it) {
+  const auto street = [](unsigned points_seed) {
+    Draw draw(points_seed);
+    PointCloud cloud = corridor(points_seed);
+    for (int i = 0; i < 1200; ++i) {
+      const bool far = i % 2 == 0;
+      add(cloud,
+          {(far ? 11.0 : -7.0) + draw.normal(0.01),
+           far ? draw.between(1.5, 3.0) : draw.between(-3.0, -1.5),
+           draw.between(0.0, 3.0)});
+    }
+    return cloud;
+  };
+  SearchArea area{{standing_at(1.8, 0.0, 0.0)}, 1.0, 0.2};
+  area.holds_robot = true;
+  area.sigma_m = 0.25;
+  const PointCloud map = street(1);
+  for (unsigned i = 0; i < 10; ++i) {
+    const Pose truth = standing_at(1.6 + 0.08 * i, 0.3, 0.1);
+    const RegistrationResult result = look(map, seen_from(street(100 + i), truth), area);
+    ASSERT_TRUE(result.accepted) << result.obstacle;
+    EXPECT_LT(std::abs(result.best->T_odom_base.p.x() - truth.p.x()), 0.03) << i;
+  }
+}
+
 TEST(Relocaliser, says_that_a_wide_area_along_a_corridor_is_as_uncertain_as_wide) {
   SearchArea area{{standing_at(1.8, 0.0, 0.0)}, 5.0, 0.2};
   area.holds_robot = true;

@@ -445,5 +445,54 @@ TEST(ScanMatcher, a_step_is_as_long_as_the_scan_is_pulled_back) {
   EXPECT_NEAR(step[0], -kAway_m, 0.25 * kAway_m);
 }
 
+/// Walls 4 m beside the tunnel's axis; its length is told by a field of plates far to one side, and
+/// a part of these goes along with the scan.
+class TunnelWithPlates final : public UnchangingMap {
+ public:
+  bool match_surface(const Eigen::Vector3d& p, PlaneMatch& plane) const override {
+    return p.y() < 10.0 && tunnel_.match_surface(p, plane);
+  }
+
+  bool match_nearest(const Eigen::Vector3d& p, PlaneMatch& plane) const override {
+    if (p.y() < 10.0) {
+      return false;
+    }
+    const double plate_m = 4.0 * std::round(p.x() / 4.0);
+    const VoxelIndex place = voxel_index(plate_m, p.y(), p.z(), 0.5);
+    const bool goes_along = (7 * place.x + 3 * place.y + 5 * place.z) % 5 == 0;
+    const double centre_m = (voxel_index(p.x(), p.y(), p.z(), 5.0).x + 0.5) / 5.0;
+    plane = {Eigen::Vector3d::UnitX(), goes_along ? -centre_m : -plate_m, 0.01, 0.0};
+    return true;
+  }
+
+ private:
+  Room tunnel_{false};
+};
+
+/// What is shortened along the tunnel must not turn the robot instead.
+TEST(ScanMatcher, an_open_axis_does_not_turn_the_robot) {
+  constexpr double kAway_m = 0.1;
+  const TunnelWithPlates tunnel;
+  PointCloud points = room_points();
+  for (int i = 0; i < 1600; ++i) {
+    points.push_back({4.0F * static_cast<float>(i % 5 - 2),
+                      12.0F + 0.5F * static_cast<float>(i / 5 % 16),
+                      0.25F * static_cast<float>(i / 80) - 2.0F,
+                      0.0F});
+  }
+  const MatchingConfig config;
+  Workers workers{2};
+  ScanMatcher matcher(points, tunnel, Pose{}, config, workers);
+  const PoseInformation sum =
+      matcher.linearise({Eigen::Quaterniond::Identity(), {kAway_m, 0.0, 0.0}});
+  Matrix6d prior = Matrix6d::Zero();
+  prior.diagonal() << Eigen::Vector3d::Constant(1.0 / 0.09), Eigen::Vector3d::Constant(4e4);
+  const Matrix6d covariance = (sum.information + prior).inverse();
+  const Vector6d step = -covariance * sum.gradient;
+  EXPECT_LT(std::abs(step[5]), std::sqrt(covariance(5, 5)));
+  EXPECT_LT(std::abs(step[5]), 1e-3);
+  EXPECT_NEAR(step[0], -kAway_m, 0.4 * kAway_m);
+}
+
 }  // namespace
 }  // namespace trigpoint::lio_mapper
