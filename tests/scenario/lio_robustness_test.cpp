@@ -26,6 +26,7 @@ struct Fault {
   const char* overlay;
   const char* event;     ///< the beginning of the code that must be said
   double worst_error_m;  ///< during the fault, what the sensors that are left make possible
+  int seeds{kSeeds};
 };
 
 class MapperWith : public testing::TestWithParam<Fault> {};
@@ -65,7 +66,7 @@ Outcome outcome_of(const LioDrive& drive) {
 TEST_P(MapperWith, stays_up_says_so_recovers_and_knows_its_error) {
   const Fault& fault = GetParam();
   const auto scenario = simulator::load_scenario("campus+" + std::string(fault.overlay));
-  const auto drives = drive_lio_all(kSeeds, [&](int i) {
+  const auto drives = drive_lio_all(fault.seeds, [&](int i) {
     LioDriveOptions options;
     options.duration_s = kDuration_s;
     return drive_lio(scenario, static_cast<std::uint64_t>(i + 1), options);
@@ -103,20 +104,21 @@ TEST_P(MapperWith, stays_up_says_so_recovers_and_knows_its_error) {
     outside += outcome.outside;
     count += outcome.count;
   }
-  EXPECT_LT(outside, 1 + count / 50);
+  EXPECT_LT(outside, 1 + count / 100);
 }
 
 INSTANTIATE_TEST_SUITE_P(
     Faults,
     MapperWith,
-    testing::Values(Fault{"lidar_lost_scans", "lio_started", 0.3},
-                    Fault{"lidar_back_in_time", "scan_refused_stamp_not_after_previous", 0.3},
-                    Fault{"lidar_blocked", "lio_lost", 10.0},
-                    Fault{"lidar_blank", "lio_lost", 10.0},
-                    Fault{"lidar_nan", "scan_refused_", 0.5},
-                    Fault{"lidar_one_ring", "lio_", 1.0},
-                    Fault{"imu_gaps", "imu_gap", 2.0},
-                    Fault{"imu_saturated", "imu_saturated", 1.0}),
+    testing::Values(
+        Fault{"lidar_lost_scans", "lio_started", 0.3},
+        Fault{"lidar_back_in_time", "scan_refused_stamp_not_after_previous", 0.3},
+        Fault{"lidar_blocked", "lio_lost", 10.0, 24},  // each is found from another place
+        Fault{"lidar_blank", "lio_lost", 10.0},
+        Fault{"lidar_nan", "scan_refused_", 0.5},
+        Fault{"lidar_one_ring", "lio_", 1.0},
+        Fault{"imu_gaps", "imu_gap", 2.0},
+        Fault{"imu_saturated", "imu_saturated", 1.0}),
     [](const auto& tested) { return std::string(tested.param.overlay); });
 
 }  // namespace
