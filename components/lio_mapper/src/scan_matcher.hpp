@@ -87,7 +87,7 @@ class ScanMatcher {
     // Of the last complete sum: as it was before it was weighed, the step that it asks for, ...
     Matrix6d unweighed{Matrix6d::Zero()};
     Vector6d step{Vector6d::Zero()};
-    // ... the share that is left along axes that are noisy or open, and the least that residuals
+    // ... the share that is left along axes whose normals are noisy, and the least that residuals
     // may scatter by, in parts of their stated variances.
     Matrix6d kept{Matrix6d::Zero()};
     double least_scatter{1.0};
